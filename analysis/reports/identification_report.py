@@ -36,10 +36,11 @@ class IdentificationFindings:
     model: IdentifiedModel
     resonances: tuple[Resonance, ...]
     """Resonances of the estimate; empty where none was found."""
-    onset: CouplingOnset
-    """Frequency from which the axes are coupled, or that none was found."""
+    onset: CouplingOnset | str
+    """Frequency from which the axes are coupled, or that none was found; the reason, as a clause, where coupling cannot
+    be judged."""
     bands: tuple[FrequencyBand, ...]
-    """Frequency bands of figure 1 in ascending order; without bands, the figure is left out."""
+    """Frequency bands of figure 1 in ascending order; without bands or onset, the figure is left out."""
     direction_limit_hz: float
     """Highest frequency (Hz) at which people perceive the direction of a vibration; drawn with the bands."""
     order: OrderReport | None
@@ -57,7 +58,7 @@ def make_identification_pictures(findings: IdentificationFindings) -> tuple[Pict
     curve_hz = np.geomspace(low_hz, high_hz, CURVE_POINT_COUNT)
     model_curve = ResponseCurve("model", curve_hz, compute_model_response(findings.model, curve_hz))
     pictures = [make_transfer_functions_picture(findings.estimate, model_curve, findings.model.band_hz)]
-    if findings.bands:
+    if findings.bands and not isinstance(findings.onset, str):
         pictures.append(
             make_frequency_bands_picture(findings.estimate, findings.onset, findings.bands, findings.direction_limit_hz)
         )
@@ -118,9 +119,11 @@ def _make_resonance_table(resonances: Sequence[Resonance]) -> Table:
     return Table("Resonances", ("Frequency", "95 % interval", "Damping ratio", "95 % interval", "Seen in"), rows)
 
 
-def _describe_onset(onset: CouplingOnset) -> str:
+def _describe_onset(onset: CouplingOnset | str) -> str:
     """Describe in a sentence the frequency at which coupling begins, with its interval if known, and the rule by which
-    it was found."""
+    it was found, or the reason why coupling cannot be judged."""
+    if isinstance(onset, str):
+        return f"The onset of coupling was not searched: {onset}."
     if onset.frequency_hz is None:
         return f"No onset of coupling was found. Rule: {onset.rule}."
     interval_text = ""

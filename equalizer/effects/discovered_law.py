@@ -205,22 +205,23 @@ def list_response_signals(channels: Channels) -> tuple[str, ...]:
 def index_force_signals(channels: Channels) -> dict[str, int]:
     """List the index of each signal in the compiled law's input: time, then position, velocity, acceleration and
     command of each axis, then the conditions."""
-    condition_labels = name_conditions(channels)
     first_condition = 1 + SIGNALS_PER_AXIS * len(channels.inputs)
-    conditions = {name: index for index, name in enumerate(condition_labels, first_condition)}
-    return conditions | {"t": 0, **{name: 1 + index for name, index in _iterate_motion_signals(channels)}}
+    conditions = {name: index for index, name in enumerate(name_conditions(channels), first_condition)}
+    signals = [("t", 0), *((name, 1 + index) for name, index in _iterate_motion_signals(channels))]
+    # A channel's name replaces none of the names t, x, vx, ax, fx, which come first.
+    reserved = signals[: 1 + SIGNALS_PER_AXIS * len(derive_axis_letters(channels.inputs))]
+    return conditions | dict(signals) | dict(reserved)
 
 
 def _iterate_motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
-    """Iterate over the names of the axes' signals and their indices after the time; response channels are named only
-    where there is one per axis, of a quantity in `DERIVATIVE_OF_QUANTITY`."""
+    """Iterate over the names of the axes' signals, by letters first, and their indices after the time; response
+    channels are named only where there is one per axis, of a quantity in `DERIVATIVE_OF_QUANTITY`."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     for axis, letter in enumerate(derive_axis_letters(channels.inputs)):
         for signal_index, prefix in enumerate((*DERIVATIVE_PREFIXES, COMMAND_PREFIX)):
             yield prefix + letter, SIGNALS_PER_AXIS * axis + signal_index
-    for axis, name in enumerate(channels.outputs if len(channels.outputs) == len(channels.inputs) else ()):
-        if order is not None:
-            yield name, SIGNALS_PER_AXIS * axis + order
+    if order is not None and len(channels.outputs) == len(channels.inputs):
+        yield from ((name, SIGNALS_PER_AXIS * axis + order) for axis, name in enumerate(channels.outputs))
     for axis, name in enumerate(channels.inputs):
         yield name, SIGNALS_PER_AXIS * axis + len(DERIVATIVE_PREFIXES)
 
@@ -259,8 +260,8 @@ def _make_force_action(
 def _make_command_action(law: Law, channels: Channels) -> OnCommand:
     """Make the action of a law that replaces the command of its axis. Raises LawError for a signal that is
     neither a command nor the time."""
-    signals = {COMMAND_PREFIX + letter: axis for axis, letter in enumerate(derive_axis_letters(channels.inputs))}
-    signals |= {name: axis for axis, name in enumerate(channels.inputs)}
+    letters = {COMMAND_PREFIX + letter: axis for axis, letter in enumerate(derive_axis_letters(channels.inputs))}
+    signals = letters | {name: axis for axis, name in enumerate(channels.inputs)} | letters
     # Compiled only to raise LawError now, not in the first simulation: the columns, such as -1 of t, are not read.
     compile_program(law.tree, {**signals, "t": -1})
 
@@ -296,4 +297,4 @@ def _index_response_signals(channels: Channels) -> Mapping[str, int]:
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     letters = derive_axis_letters(channels.outputs) if order is not None else ()
     derivative_names = {DERIVATIVE_PREFIXES[order or 0] + letter: column for column, letter in enumerate(letters)}
-    return {**derivative_names, **{name: column for column, name in enumerate(channels.outputs)}}
+    return derivative_names | {name: column for column, name in enumerate(channels.outputs)} | derivative_names

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.effects.discovered_law import (
+    AXIS_LETTERS,
     COMMAND_PREFIX,
     DERIVATIVE_PREFIXES,
     Channels,
@@ -55,10 +56,10 @@ def make_library_effects(entries: Sequence[LawEntry], recording: Recording) -> t
 def make_effects_per_axis(entry: LawEntry, channels: Channels) -> tuple[Effect, ...]:
     """Make one effect per axis (response channel for a law of the response), the formula moved to it by a cyclic
     permutation of the axis letters. Raises LawError where the recording lacks a signal."""
-    axis_letters = derive_axis_letters(channels.outputs if entry.law.acts_on == "response" else channels.inputs)
+    axis_channels = channels.outputs if entry.law.acts_on == "response" else channels.inputs
     effects = []
-    for site in range(len(axis_letters)):
-        law = _permute_to_axis(entry.law, axis_letters, site)
+    for site in range(len(derive_axis_letters(axis_channels))):
+        law = _permute_to_axis(entry.law, axis_channels, site)
         effect = make_law_effect(law, channels)
         effects.append(
             replace(
@@ -72,10 +73,23 @@ def make_effects_per_axis(entry: LawEntry, channels: Channels) -> tuple[Effect, 
     return tuple(effects)
 
 
-def _permute_to_axis(law: Law, axis_letters: tuple[str, ...], site: int) -> Law:
-    """Permute the letters in the formula cyclically, so that the axis of the law becomes that with index `site`. If the
-    new recording lacks the letter of the law's axis, it counts as that of the first axis."""
-    law_letter = law.axis[-1:]
+def find_law_letter(law: Law, channels: tuple[str, ...]) -> str:
+    """Find the letter by which formulas call the axis of a law. channels: names of the commands, or of the responses
+    for a law of the response. An axis that is none of these channels has its own last letter or, where that is not x, y
+    or z, the only letter in the formula."""
+    letter_by_channel = dict(zip(channels, derive_axis_letters(channels), strict=False))
+    if law.axis in letter_by_channel:
+        return letter_by_channel[law.axis]
+    prefixes = (*DERIVATIVE_PREFIXES, COMMAND_PREFIX)
+    used_letters = [letter for letter in AXIS_LETTERS if any(prefix + letter in law.variables for prefix in prefixes)]
+    own_letter = law.axis[-1:]
+    return own_letter if own_letter in AXIS_LETTERS or len(used_letters) != 1 else used_letters[0]
+
+
+def _permute_to_axis(law: Law, channels: tuple[str, ...], site: int) -> Law:
+    """Permute the letters in the formula cyclically, so that the axis of the law becomes that with index `site` among
+    the channels. If the new recording lacks the letter of the law's axis, it counts as that of the first axis."""
+    law_letter, axis_letters = find_law_letter(law, channels), derive_axis_letters(channels)
     letter_index = axis_letters.index(law_letter) if law_letter in axis_letters else 0
     new_letters = {
         letter: axis_letters[(index + site - letter_index) % len(axis_letters)]

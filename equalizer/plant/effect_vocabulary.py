@@ -36,7 +36,7 @@ class EffectParameter:
         if system.rotational is None and self.unit == ROTATIONAL.force:
             unit = system.force
         if unit == f"1/{RESPONSE}^2":
-            return f"1/({response_unit})^2"
+            return "1" if response_unit == "1" else f"1/({response_unit})^2"
         return response_unit if unit == RESPONSE else unit
 
 

@@ -106,3 +106,11 @@ def test_the_rate_of_the_model_is_asked_for():
     require_rate(parse_trajectory(GOOD), 1000.0)
     with pytest.raises(TableError, match="the rows are at 1000 Hz, but the model is at 500 Hz; resample them to it"):
         require_rate(parse_trajectory(GOOD), 500.0)
+
+
+def test_a_rate_that_differs_by_rounding_becomes_that_of_the_model():
+    """Exactly: the rates of a signal and a model are compared without a tolerance."""
+    rows = "".join(f"{k / 999.7:.6f},0,0,{k}\n" for k in range(1000))
+    table = parse_trajectory(f"time_s,ax,ay,az\n{rows}")
+    assert table.signal.sample_rate_hz != 999.7
+    assert require_rate(table, 999.7).signal.sample_rate_hz == 999.7

@@ -16,8 +16,9 @@ from equalizer.signals.spectral_density import hann
 
 SETTLING_S = 0.5
 """Settling time (s) after the last excitation, before samples count as rest. Chosen by hand."""
-_REST_WINDOW_S = 0.5
-"""Length of a window at rest (s): lines 2 Hz apart. Chosen by hand."""
+_REST_WINDOW_S, _LEAST_REST_WINDOW = 0.5, 8
+"""Length of a window at rest (s): lines 2 Hz apart; and its least number of samples, which have the three lines that
+`interpolate_rest_density` needs. Chosen by hand."""
 _THIRD_DIFFERENCE_GAIN = 20.0
 """Variance of a third difference over that of a line: 1² + 3² + 3² + 1², from its coefficients 1, -3, 3, -1."""
 
@@ -65,7 +66,7 @@ def estimate_rest_density(recordings: Sequence[Recording], frequency_hz: FloatAr
     frequency_hz: (lines,). None where no pause contains a window (`_REST_WINDOW_S`) without missing samples."""
     window_powers, lines_hz = [], np.empty(0)
     for recording in recordings:
-        length = round(_REST_WINDOW_S * recording.sample_rate_hz)
+        length = max(_LEAST_REST_WINDOW, round(_REST_WINDOW_S * recording.sample_rate_hz))
         lines_hz = np.arange(1, length // 2) * recording.sample_rate_hz / length
         window_powers += compute_rest_powers(recording, recording.response.samples, length)
     return interpolate_rest_density(np.mean(window_powers, axis=0), lines_hz, frequency_hz) if window_powers else None

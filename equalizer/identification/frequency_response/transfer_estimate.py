@@ -26,7 +26,8 @@ from equalizer.identification.frequency_response.reliable_lines import (
     judge_lines,
 )
 from equalizer.identification.frequency_response.shared_lines import SharedLines, solve_shared_lines
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Hold, Recording
+from equalizer.signals.recording_checks import find_unusable_channels
 from equalizer.signals.signal import FloatArray, Signal
 
 
@@ -48,9 +49,9 @@ class EstimateSettings:
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
     """Estimate the transfer function from the total command to the response. Raises TransferEstimateError where there
-    is no recording, the recordings differ in rate, channels or units, no segment for the fit yields a whole period or
-    window without missing samples, an output is constant, or there are fewer independent experiments than inputs at
-    every line."""
+    is no recording, the recordings differ in hold, rate, channels or units, no segment for the fit yields a whole
+    period or window without missing samples, an output is constant, or there are fewer independent experiments than
+    inputs at every line."""
     settings = settings or EstimateSettings()
     _check_compatible(recordings)
     experiment_set = _collect_experiments(recordings, settings)
@@ -88,6 +89,11 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
             "A feedback acted, but its share of the command was not recorded: noise that it fed back biases the "
             "estimate where the response is weak."
         )
+    if recordings[0].hold is not Hold.ZERO_ORDER:
+        remarks.append(
+            f"The command is {recordings[0].hold.value} between its samples, and so are the commands of a model: a "
+            "controller that holds each force until the next one acts half a sample later than the model predicts."
+        )
     return replace(experiment_set, remarks=tuple(remarks))
 
 
@@ -95,22 +101,25 @@ def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterat
     """Partition all lines by the experiments that contain them; yields the frequencies (lines,), Hz, of each group, and
     its experiments restricted to these lines."""
     lengths = sorted({experiment.length for experiment in experiments})
-    # Lines as integer multiples of rate / common, common the least common multiple of the lengths: compared exactly.
-    common_length = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
-    lines_by_length = {
-        length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common_length // length) for length in lengths
-    }
+    # Lines k / length in cycles per sample: a quotient of whole numbers is rounded correctly, so that equal lines of
+    # different lengths are equal numbers. The least common multiple of many lengths could exceed 64 bits.
+    lines_by_length = {length: np.arange(1, (length + 1) // 2) / length for length in lengths}
     all_lines = np.unique(np.concatenate(list(lines_by_length.values())))
     has_line = np.stack([np.isin(all_lines, lines_by_length[length]) for length in lengths], axis=1)
     for pattern in np.unique(has_line, axis=0):
         shared_lines = all_lines[(has_line == pattern).all(axis=1)]
-        chosen_lengths = {length for length, has_lines in zip(lengths, pattern, strict=True) if has_lines}
+        numbers_by_length = {
+            length: np.rint(shared_lines * length).astype(np.int64)
+            for length, has_lines in zip(lengths, pattern, strict=True)
+            if has_lines
+        }
         restricted_experiments = [
-            _select_lines(experiment, shared_lines // (common_length // experiment.length) - 1)
+            _select_lines(experiment, numbers_by_length[experiment.length] - 1)
             for experiment in experiments
-            if experiment.length in chosen_lengths
+            if experiment.length in numbers_by_length
         ]
-        yield shared_lines * (rate_hz / common_length), restricted_experiments
+        length, line_numbers = next(iter(numbers_by_length.items()))
+        yield line_numbers * (rate_hz / length), restricted_experiments
 
 
 def _select_lines(experiment: Experiment, line_indices: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
@@ -159,13 +168,14 @@ def _join_groups(
 
 
 def _check_compatible(recordings: Sequence[Recording]) -> None:
-    """Check the recordings: raises TransferEstimateError without any, and where sample rate, channels or units
+    """Check the recordings: raises TransferEstimateError without any, and where hold, sample rate, channels or units
     differ."""
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first_recording = recordings[0]
     for recording_number, recording in enumerate(recordings[1:], start=2):
         for property_name, expected, value in (
+            ("hold", first_recording.hold.value, recording.hold.value),
             ("sample rate", f"{first_recording.sample_rate_hz:.12g} Hz", f"{recording.sample_rate_hz:.12g} Hz"),
             ("command channels", _describe_channels(first_recording.command), _describe_channels(recording.command)),
             ("response channels", _describe_channels(first_recording.response), _describe_channels(recording.response)),
@@ -180,10 +190,8 @@ def _check_compatible(recordings: Sequence[Recording]) -> None:
 def _refuse_constant_outputs(recordings: Sequence[Recording]) -> None:
     """Raise TransferEstimateError for an output that is constant in every recording, as of a stuck sensor: its response
     would consist of rounding errors."""
-    sample_arrays = [recording.response.samples for recording in recordings]
-    constant_outputs = np.all([(samples == samples[:1]).all(axis=0) for samples in sample_arrays], axis=0)
     constant_names = ", ".join(
-        name for name, is_constant in zip(recordings[0].response.channels, constant_outputs, strict=True) if is_constant
+        name for name, _ in find_unusable_channels([recording.response for recording in recordings])
     )
     if constant_names:
         raise TransferEstimateError(

@@ -140,10 +140,12 @@ def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] |
 
 
 def have_same_lines(first: SegmentLines, second: SegmentLines) -> bool:
-    """Whether two segments have no transient and the same rate, hold and number of lines, hence the same lines."""
-    return not (first.transient or second.transient) and (first.rate_hz, first.hold, len(first.frequency_hz)) == (
-        second.rate_hz, second.hold, len(second.frequency_hz),
-    )  # fmt: skip
+    """Whether two segments have no transient and the same rate, hold and lines."""
+    return (
+        not (first.transient or second.transient)
+        and (first.rate_hz, first.hold) == (second.rate_hz, second.hold)
+        and np.array_equal(first.frequency_hz, second.frequency_hz)
+    )
 
 
 def _select_lines(segment: SegmentLines, chosen_lines: npt.NDArray[np.int64]) -> SegmentLines:

@@ -74,9 +74,6 @@ class IdentificationResult(SummaryDisplay):
     the response; None without draws. Lack of fit is not included."""
     misfit: Misfit
     """Lack of fit: difference of the lines from the model beyond their noise."""
-    expected_error: float | None
-    """95 % bound of the total error, relative to the response: `scatter`, and the upper bound of the misfit; None
-    without draws."""
     lines: int
     """Number of lines within the band, without its margins."""
     candidates: tuple[Candidate, ...]
@@ -88,6 +85,12 @@ class IdentificationResult(SummaryDisplay):
     """Whether the requested bound on the decay prevents a fit of the data."""
     remarks: tuple[str, ...]
     """Remarks for the user, as sentences; `misfit_causes` has likely causes of a misfit."""
+
+    @property
+    def expected_error(self) -> float | None:
+        """95 % bound of the total error, relative to the response: `scatter`, and the upper bound of the misfit; None
+        without draws."""
+        return None if self.scatter is None else float(np.hypot(self.scatter, self.misfit.upper_bound))
 
     @property
     def slowest_decay_s(self) -> float:
@@ -215,9 +218,8 @@ def _assess_model(
         cost=cost,
         rms_relative_error=float(np.sqrt((relative_error**2).mean())),
         worst_relative_error=float(relative_error.max()),
-        scatter=(scatter := compute_relative_deviation(model, lines.frequency_hz[is_in_band], relaxed_poles)),
+        scatter=compute_relative_deviation(model, lines.frequency_hz[is_in_band], relaxed_poles),
         misfit=misfit,
-        expected_error=None if scatter is None else float(np.hypot(scatter, misfit.upper_bound)),
         lines=int(is_in_band.sum()),
         candidates=candidates,
         chosen=chosen,

@@ -193,7 +193,8 @@ def _compute_jacobian(fit: _ProjectedFit, lines: WeightedLines) -> FloatArray:
     derivatives[..., block_count : 2 * block_count] = np.einsum(
         "lis,lsj->jlis", state_outputs[:, :, 1::2], state_responses[:, ::2]
     )
-    for i in range(p):
+    # With a single output, B absorbs every change of C: no step of C, whose derivative would be rounding errors.
+    for i in range(p) if p > 1 else ():
         derivatives[:, :, i, 2 * block_count + i * n : 2 * block_count + (i + 1) * n] = state_responses.transpose(
             2, 0, 1
         )

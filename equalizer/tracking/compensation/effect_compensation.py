@@ -107,31 +107,40 @@ def compensate(
 
 
 def convert_motion_to_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
-    """Convert a motion along the response channels to one along the driven axes, on which the effects act: the sign of
-    an axis is reversed where the diagonal of the product of output matrix and driven axes is negative. Unchanged where
-    that product has fewer rows or columns than the motion has axes."""
-    channel_gains = physics.output @ compute_driven_axes(physics)
-    axis_count = motion.position.shape[1]
+    """Convert a motion along the response channels to one along the driven axes, on which the effects act. Where the
+    responses measure rotated axes, it is rotated back. Elsewhere the sign of an axis is reversed where the diagonal of
+    the product of output matrix and driven axes is negative. Unchanged where that product has fewer rows or columns
+    than the motion has axes."""
+    driven_axes, axis_count = compute_driven_axes(physics), motion.position.shape[1]
+    channel_gains = physics.output @ driven_axes
     if min(channel_gains.shape) < axis_count:
         return motion
     signs = np.where(np.diagonal(channel_gains)[:axis_count] < 0, -1.0, 1.0)
-    return PlannedMotion(motion.position * signs, motion.velocity * signs, motion.acceleration * signs)
+    is_rotation = (
+        channel_gains.shape == (axis_count, axis_count)
+        and np.allclose(channel_gains @ channel_gains.T, np.eye(axis_count))
+        and np.allclose(channel_gains @ driven_axes.T, physics.output)
+    )
+    to_axes = channel_gains if is_rotation else np.diag(signs)
+    return PlannedMotion(motion.position @ to_axes, motion.velocity @ to_axes, motion.acceleration @ to_axes)
 
 
 def find_effect_axes(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
-    """Find the indices of the axes that an effect acts on, by the name of an input or output channel or its last
-    letter; all where the effect has no axis. Raises ValueError for an unknown axis, and for different numbers of
-    channels."""
-    axis_indices = tuple(
-        index
-        for index, channels in enumerate(zip(inputs, outputs, strict=True))
-        if effect.axis is None or any(effect.axis in (channel, channel[-1:]) for channel in channels)
-    )
-    if not axis_indices:
+    """Find the indices of the axes that an effect acts on, by the name of an input channel or its last letter, else of
+    an output channel; all where the effect has no axis. Raises ValueError for an unknown axis, and for different
+    numbers of channels."""
+    if len(inputs) != len(outputs):
         raise ValueError(
-            f"{effect.kind} is on the axis '{effect.axis}', but there are {', '.join(inputs)} and {', '.join(outputs)}"
+            f"there are {len(inputs)} commands and {len(outputs)} responses; give one response per command"
         )
-    return axis_indices
+    if effect.axis is None:
+        return tuple(range(len(inputs)))
+    for names in (inputs, [name[-1:] for name in inputs], outputs, [name[-1:] for name in outputs]):
+        if axis_indices := tuple(index for index, name in enumerate(names) if name == effect.axis):
+            return axis_indices
+    raise ValueError(
+        f"{effect.kind} is on the axis '{effect.axis}', but there are {', '.join(inputs)} and {', '.join(outputs)}"
+    )
 
 
 def compute_axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> FloatArray:

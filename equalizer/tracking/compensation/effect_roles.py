@@ -6,7 +6,6 @@ The texts are shown to the user as the reason why an effect is not compensated. 
 
 import numpy as np
 
-from equalizer.effects.discovered_law import derive_axis_letters
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.compensation.known_forces import LAWS
@@ -50,7 +49,7 @@ def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx"
     catalogue."""
     kind = effect.kind
     if effect.law is not None:
-        return explain_law_not_compensated(effect.law, derive_axis_letters(inputs))
+        return explain_law_not_compensated(effect.law, inputs)
     if kind in LAWS or kind == "force_deadband":
         return ""
     if kind in SCALING_EFFECTS:

@@ -12,6 +12,8 @@ from itertools import chain, takewhile
 
 import numpy as np
 
+from equalizer.effects.discovered_law import derive_axis_letters
+from equalizer.effects.law_entry import find_law_letter
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY_OPERATORS
@@ -47,17 +49,17 @@ SENSOR_ERROR = "it is an error of the sensor: a force against it would turn that
 """Reasons why a law is not compensated, as clauses after "because"."""
 
 
-def explain_law_not_compensated(law: Law, axis_letters: tuple[str, ...]) -> str:
-    """Explain why a law is not compensated, as a clause after "because"; empty for a compensated law. axis_letters:
-    letters of the axes, in the order of the commands."""
-    motion_signals = {prefix + letter for letter in axis_letters for prefix in MOTION_PREFIXES}
+def explain_law_not_compensated(law: Law, inputs: tuple[str, ...]) -> str:
+    """Explain why a law is not compensated, as a clause after "because"; empty for a compensated law. inputs: channels
+    of the commands."""
+    motion_signals = {prefix + letter for letter in derive_axis_letters(inputs) for prefix in MOTION_PREFIXES}
     if law.acts_on == "response":
         return SENSOR_ERROR
     if law.acts_on == "force":
         return "" if set(law.variables) <= motion_signals else NOT_OF_MOTION_ALONE
     if any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(law.tree)):
         return HAS_MEMORY
-    if len(law.variables) != 1 or law.variables[0] not in (f"f{law.axis[-1:]}", law.axis):
+    if len(law.variables) != 1 or law.variables[0] not in (f"f{find_law_letter(law, inputs)}", law.axis):
         return NOT_OF_OWN_COMMAND_ALONE
     tables = (_tabulate(law, command_range)[1] for command_range in _TESTED_RANGES)
     return "" if any(_is_rising(forces) and (np.diff(forces) > 0).any() for forces in tables) else NOT_INVERTIBLE

@@ -60,7 +60,9 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
         LOWER_LIMIT_FACTOR * excited_hz[0],
         min(UPPER_LIMIT_FACTOR * excited_hz[1], LARGEST_RATE_SHARE * rate_hz),
     )
-    integrated_motion = integrate_motion(recording.response.samples, rate_hz, band_hz, compute_lead_s(physics, rate_hz))
+    # Without the offset of the sensor, such as gravity: the record must begin and end at zero.
+    acceleration = recording.response.samples - recording.response.samples.mean(axis=0)
+    integrated_motion = integrate_motion(acceleration, rate_hz, band_hz, compute_lead_s(physics, rate_hz))
     motion = convert_motion_to_axes(integrated_motion, physics)
     axis_gains, commands = compute_axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:

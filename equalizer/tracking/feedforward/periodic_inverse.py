@@ -82,8 +82,8 @@ def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
 
 
 def check_reference(model: IdentifiedModel, reference: Signal) -> None:
-    """Check a reference signal against the model. Raises ValueError for a signal whose rate, channels or units are not
-    the model's."""
+    """Check a reference signal against the model. Raises ValueError for a signal whose rate, number of channels or
+    units are not the model's, or that has the model's channels in another order."""
     if reference.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
             f"the model runs at {model.sample_rate_hz:g} Hz, not at {reference.sample_rate_hz:g} Hz; "
@@ -93,6 +93,11 @@ def check_reference(model: IdentifiedModel, reference: Signal) -> None:
     if reference.samples.shape[1] != output_count:
         raise ValueError(
             f"the model has {output_count} outputs, but the reference has {reference.samples.shape[1]} channels"
+        )
+    if reference.channels != model.output_channels and set(reference.channels) == set(model.output_channels):
+        raise ValueError(
+            f"the model has the outputs {', '.join(model.output_channels)}, but the reference has the channels "
+            f"{', '.join(reference.channels)}; put them in the same order"
         )
     units = set(reference.units)
     if units != set([model.output_unit] if isinstance(model.output_unit, str) else model.output_unit):

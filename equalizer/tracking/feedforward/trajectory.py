@@ -7,7 +7,7 @@ accelerations of three axes, forces of three axes, or a transient along a single
 
 import csv
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,14 +103,15 @@ def format_trajectory_csv(trajectory: Trajectory) -> str:
     return "\n".join(lines) + "\n"
 
 
-def require_rate(trajectory: Trajectory, model_rate_hz: float) -> None:
-    """Check that a trajectory has the sample rate of a model, `model_rate_hz`. Raises TableError where the rates differ
-    by more than `RATE_TOLERANCE`."""
+def require_rate(trajectory: Trajectory, model_rate_hz: float) -> Trajectory:
+    """Return a trajectory with exactly the sample rate of a model, `model_rate_hz`; that of a table is rounded. Raises
+    TableError where the rates differ by more than `RATE_TOLERANCE`."""
     table_rate_hz = trajectory.signal.sample_rate_hz
     if abs(table_rate_hz - model_rate_hz) > RATE_TOLERANCE * model_rate_hz:
         raise TableError(
             (f"the rows are at {table_rate_hz:g} Hz, but the model is at {model_rate_hz:g} Hz; resample them to it",)
         )
+    return replace(trajectory, signal=replace(trajectory.signal, sample_rate_hz=model_rate_hz))
 
 
 def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:

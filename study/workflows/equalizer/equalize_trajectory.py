@@ -91,7 +91,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
     amplitude_n = None if physics is None else _read_amplitude_n(models.nearest)
     try:
-        require_rate(reference, models.most_weighted.sample_rate_hz)
+        reference = require_rate(reference, models.most_weighted.sample_rate_hz)
         feedforward, band_predictions = _solve_feedforward(plan, reference, models)
     except ForceLimitError as limit_error:
         raise StudyError(

@@ -12,11 +12,13 @@ from analysis.reports.identification_report import (
     make_identification_pictures,
     render_identification_report,
 )
-from equalizer.identification.frequency_response.coupling_onset import find_coupling_onset
+from equalizer.identification.frequency_response.coupling_onset import CouplingOnset, find_coupling_onset
 from equalizer.identification.frequency_response.frequency_bands import (
     PUBLISHED_DIRECTION_LIMIT_HZ,
+    FrequencyBand,
     compute_frequency_bands,
 )
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.resonances import find_resonances
 from equalizer.identification.state_space.order_report import OrderReport, compare_orders
 from equalizer.identification.state_space.refusals import IdentificationError
@@ -49,20 +51,32 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
 
 def collect_findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> IdentificationFindings:
     """Collect the content of the page. on_progress: called with the share done, 0 to 1, of the comparison of orders."""
-    coupling_onset = find_coupling_onset(device.estimate)
-    # Bands begin at 1 Hz or above, as by default in `compute_frequency_bands`.
-    lowest_hz, highest_hz = max(1.0, float(device.estimate.frequency_hz[0])), float(device.estimate.frequency_hz[-1])
+    onset, bands = _find_onset_and_bands(device.estimate)
     return IdentificationFindings(
         estimate=device.estimate,
         model=device.model,
         resonances=find_resonances(device.estimate),
-        onset=coupling_onset,
-        bands=compute_frequency_bands(coupling_onset.frequency_hz, lowest_hz=lowest_hz, highest_hz=highest_hz),
+        onset=onset,
+        bands=bands,
         direction_limit_hz=PUBLISHED_DIRECTION_LIMIT_HZ,
         order=_compare_lower_orders(device, on_progress),
         results=format_summary(device),
         remarks=device.remarks,
     )
+
+
+def _find_onset_and_bands(estimate: FrequencyResponse) -> tuple[CouplingOnset | str, tuple[FrequencyBand, ...]]:
+    """Find the onset of coupling, or the reason why it cannot be judged, and the frequency bands; no bands without an
+    onset, or where the direction limit is not within the measured frequencies."""
+    try:
+        onset = find_coupling_onset(estimate)
+    except ValueError as problem:  # outputs and inputs differ in number, too few lines, or too much noise
+        return str(problem), ()
+    # Bands begin at 1 Hz or above, as by default in `compute_frequency_bands`.
+    lowest_hz, highest_hz = max(1.0, float(estimate.frequency_hz[0])), float(estimate.frequency_hz[-1])
+    if not lowest_hz < PUBLISHED_DIRECTION_LIMIT_HZ < highest_hz:
+        return onset, ()
+    return onset, compute_frequency_bands(onset.frequency_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
 
 
 def _compare_lower_orders(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> OrderReport | None:

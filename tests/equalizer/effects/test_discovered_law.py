@@ -10,8 +10,14 @@ import pytest
 from scipy.signal import butter, cont2discrete, dlsim, sosfilt
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect, make_law_parameters
-from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.discovered_law import (
+    Channels,
+    get_law_values,
+    index_force_signals,
+    make_law_effect,
+    make_law_parameters,
+)
+from equalizer.effects.effect import OnCommand, PlacedEffect
 from equalizer.effects.simulation.forces_along_motion import compute_effect_forces_along_motion
 from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -206,3 +212,18 @@ def test_a_fit_may_move_each_number_as_its_role_allows():
     scales = [parameter.scale for parameter in parameters]
     assert scales == ["signed", "log", "signed", "log", "linear", "signed", "signed", "log"]
     assert [parameter.none for parameter in parameters] == [0.0, None, 0.0, None, None, 0.0, None, None]
+
+
+def test_a_channel_named_as_another_signal_does_not_replace_that_signal():
+    """Channels of command and response that are called x, y, as the positions in a formula are."""
+    channels = Channels(("x", "y"), ("x", "y"))
+    assert index_force_signals(channels)["x"] == index_force_signals(Channels(("fx", "fy"), ("ax", "ay")))["x"]
+    swapped = index_force_signals(Channels(("fx", "fy"), ("ay", "ax")))
+    assert swapped["ax"] == index_force_signals(Channels(("fx", "fy"), ("ax", "ay")))["ax"]
+    assert index_force_signals(Channels(("t",), ("a",)))["t"] == 0
+    law = parse_law("2.0*fx", "command", "u")
+    action = make_law_effect(law, Channels(("u", "fx"), ("a", "b"))).action
+    assert isinstance(action, OnCommand)
+    assert action.of_all is not None
+    commands = np.array([[1.0, 5.0], [1.0, 5.0]])
+    assert action.of_all(commands, 0, 1e-3, get_law_values(law))[0] == pytest.approx([2.0, 2.0])

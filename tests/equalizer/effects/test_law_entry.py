@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from equalizer.effects.law_entry import LawEntry, make_library_effects
+from equalizer.effects.discovered_law import Channels
+from equalizer.effects.law_entry import LawEntry, make_effects_per_axis, make_library_effects
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import parse_law
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -63,3 +64,11 @@ def test_the_factor_is_regressed_at_every_axis_of_a_device_without_y(motion, exp
 def test_a_law_of_a_recorded_condition_starts_from_the_numbers_of_the_library(motion):
     ((values,), (moved,)) = find_starting_values("-2.0*vx*warmth", "x", 0 * motion[0], motion)
     assert values == moved == {"p0": 2.0}
+
+
+@pytest.mark.parametrize(("axis", "channels"), [("m2", ("m1", "m2")), ("x", ("a", "x")), ("m2", ("fx", "fy"))])
+def test_a_law_moves_with_its_axis_where_channels_are_not_named_by_letters(axis, channels):
+    """Signals of a second axis are y and vy in a formula, also where its channel has another name."""
+    entry = LawEntry("drag", parse_law("-8.0*vy**3", "force", axis), "found", "varies")
+    effects = make_effects_per_axis(entry, Channels(channels, ("s1", "s2")))
+    assert [effect.law.text for effect in effects] == ["-8.0*vx**3", "-8.0*vy**3"]

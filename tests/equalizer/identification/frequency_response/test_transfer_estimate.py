@@ -1,17 +1,21 @@
 """Recovery of a known truth from sweeps, multisines and noise, in open and closed loop."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
+from equalizer.identification.frequency_response.experiments import Experiment
+from equalizer.identification.frequency_response.noise_floor import estimate_rest_density
 from equalizer.identification.frequency_response.transfer_estimate import (
     EstimateSettings,
     TransferEstimateError,
+    _group_by_lines,
     estimate_transfer,
 )
 from equalizer.signals.multisine import list_lines_between, make_multisines
-from equalizer.signals.recording import Segment
+from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import Signal
 
 
@@ -232,3 +236,49 @@ def test_orthogonal_multisines_leave_no_line_without_all_directions(plants, synt
     band = estimate_transfer((synthetic.played(plants, waves, kind="multisine"),)).select_band(5.0, 35.0)
     assert band.reliable.all()
     assert synthetic.errors(band, plants.omega_like()).max() < 0.06
+
+
+def test_lines_that_many_periods_share_are_found_exactly():
+    """The least common multiple of these lengths exceeds 64 bits."""
+    lengths = [2000, 1000, 1664, 1513, 1223, 1269, 949, 990, 919, 1110]
+    experiments = [Experiment(length, *[np.zeros((1, (length + 1) // 2 - 1, 1), complex)] * 3) for length in lengths]
+    groups = list(_group_by_lines(experiments, 1000.0))
+    found_hz = np.concatenate([frequency_hz for frequency_hz, _ in groups])
+    exact = {Fraction(1000 * line, length) for length in lengths for line in range(1, (length + 1) // 2)}
+    assert len(found_hz) == len(exact)
+    assert np.allclose(sorted(found_hz), sorted(float(line) for line in exact), rtol=1e-12, atol=0)
+    assert all(part.command.shape[1] == len(frequency_hz) for frequency_hz, parts in groups for part in parts)
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 5.0, 14.0])
+def test_a_slow_device_has_a_noise_at_rest_too(rate_hz):
+    generator = np.random.default_rng(1)
+    period = np.concatenate(
+        [np.zeros((60, 1)), np.tile(generator.standard_normal((200, 1)), (3, 1)), np.zeros((60, 1))]
+    )
+    noise = 0.1 * generator.standard_normal(period.shape)
+    force = Signal(period, rate_hz, "force", "N", ("fx",))
+    response = Signal(np.roll(period, 1, axis=0) + noise, rate_hz, "acceleration", "m/s^2", ("ax",))
+    recording = Recording("slow", force, response, segments=(Segment(60, 660, "noise", 3.0, 200),))
+    estimate = estimate_transfer((recording,))
+    assert np.abs(np.abs(estimate.response) - 1).mean() < 0.1
+    density = estimate_rest_density((recording,), estimate.frequency_hz)
+    assert density.mean() == pytest.approx(0.01, rel=0.3)
+
+
+def test_a_stuck_output_with_missing_samples_is_refused(plants, synthetic):
+    recording = synthetic.sweeps(plants, 4.5, 37.0, 3.0)
+    samples = recording.response.samples.copy()
+    samples[:, 2] = 9.81
+    samples[0, 2] = np.nan
+    with pytest.raises(TransferEstimateError, match="there is no signal from az"):
+        estimate_transfer((replace(recording, response=replace(recording.response, samples=samples)),))
+
+
+def test_a_command_that_is_not_held_is_remarked_and_not_mixed(plants, synthetic):
+    held = synthetic.sweeps(plants, 4.5, 37.0, 3.0)
+    continuous = replace(held, hold=Hold.BAND_LIMITED)
+    assert any("acts half a sample later" in remark for remark in estimate_transfer((continuous,)).remarks)
+    assert not any("half a sample" in remark for remark in estimate_transfer((held,)).remarks)
+    with pytest.raises(TransferEstimateError, match="recording 2 has the hold band-limited, but the first has zero-or"):
+        estimate_transfer((held, continuous))

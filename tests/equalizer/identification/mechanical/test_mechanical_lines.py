@@ -2,7 +2,13 @@
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
+from equalizer.identification.mechanical.mechanical_lines import (
+    compute_segment_lines,
+    have_same_lines,
+    select_band,
+    split_fit_and_test,
+)
+from equalizer.identification.mechanical.mechanical_misfit import add_scatter_noise
 from equalizer.signals.recording import Segment
 from tests.equalizer.identification.mechanical.test_mechanical_fit import multisine, recording
 
@@ -31,3 +37,20 @@ def test_where_all_segments_are_marked_as_test_the_marks_are_ignored():
         )
         fit, test = split_fit_and_test([recording(command, command, segments=segments)])
         assert (len(fit), len(test)) == count
+
+
+def test_as_many_lines_are_not_the_same_lines():
+    """Two periods that excite a hundred lines each: one below 20 Hz, the other above it."""
+    rng, segments = np.random.default_rng(4), []
+    for length, first in ((5000, 1), (1000, 20)):
+        spectrum = np.zeros(length // 2 + 1, dtype=complex)
+        spectrum[first : first + 100] = np.exp(2j * np.pi * rng.random(100))
+        command = np.tile(np.fft.irfft(spectrum, length), 3)[:, None]
+        noise = 1e-6 * rng.standard_normal(command.shape)
+        segment = Segment(0, 3 * length, "multisine", 1.0, length, "fit")
+        segments.append(compute_segment_lines(recording(command, command + noise, segments=(segment,)), segment))
+    lines = select_band(segments, None)
+    assert len(lines[0].frequency_hz) == len(lines[1].frequency_hz) == 100
+    assert not have_same_lines(*lines)
+    for before, after in zip(lines, add_scatter_noise(lines), strict=True):
+        np.testing.assert_array_equal(after.noise, before.noise)

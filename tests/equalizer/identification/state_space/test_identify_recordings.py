@@ -22,3 +22,15 @@ def test_local_averages_under_a_long_bound_do_not_blunt_what_rings(plants, synth
     truth = device.response(LINES)
     error = compute_model_response(found.identified.model, LINES) - truth
     assert np.linalg.norm(error) < 0.01 * np.linalg.norm(truth)
+
+
+def test_the_expected_error_of_local_averages_is_that_on_the_lines_themselves(plants, synthetic):
+    """An order that is too low: the averages, too, are smooth, and the model may fit them closely."""
+    settings = IdentificationSettings(order=8, draws=3, longer_horizons=(0,), record_horizons=())
+    found = identify_recordings(synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3), settings)
+    assert found.fitted is not found.estimate
+    truth = plants.omega_like().response(LINES)
+    error = np.linalg.norm(compute_model_response(found.identified.model, LINES) - truth) / np.linalg.norm(truth)
+    identified = found.identified
+    assert error < 1.02 * identified.expected_error
+    assert identified.expected_error == np.hypot(identified.scatter, identified.misfit.upper_bound)

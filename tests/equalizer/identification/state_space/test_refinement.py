@@ -1,5 +1,7 @@
 """The maximum-likelihood search."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -58,6 +60,16 @@ def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
         numbers = np.concatenate([part.ravel() for part in (each.form.a, each.form.b, each.form.C, each.B, each.D)])
         theirs = 2 * least_squares(residuals, numbers, x_scale="jac", max_nfev=60).cost
         assert ours <= theirs * (1 + 1e-5)
+
+
+def test_with_a_single_output_the_size_of_c_is_not_searched(plant, lines):
+    """B takes up every change of it: steps along it would be rounding errors, and grow to 1e148."""
+    single = replace(lines, response=lines.response[:, :1, :1], weight=lines.weight[:, :1, :1])
+    start = disturbed(plant, 1, 0.02)
+    start = replace(start, C=start.C[:1])
+    found = refine_form(start, single, RADIUS)
+    assert np.array_equal(found.form.C, start.C)
+    assert single.compute_cost(found.compute_response(single.z)) < 1.2 * 2 * single.response.size
 
 
 def test_a_step_is_taken_only_if_it_lowers_the_cost(plant, lines):

@@ -61,3 +61,15 @@ def test_what_is_taken_off_turns_with_the_command():
         return subtract_effects(recording, physics(turned), BAND_HZ).command.samples
 
     np.testing.assert_allclose(freed(WAY, True), freed(np.ones(3), False) * WAY, atol=1e-9)
+
+
+def test_an_offset_of_the_sensor_such_as_gravity_changes_nothing():
+    def freed(offset):
+        recording = Recording(
+            "rubbing",
+            Signal(shaken(3), RATE_HZ, "force", "N", FORCES),
+            Signal(shaken(4) + offset, RATE_HZ, "acceleration", "m/s^2", ACCELERATIONS),
+        )
+        return subtract_effects(recording, physics(False), BAND_HZ).command.samples
+
+    np.testing.assert_allclose(freed(np.array([0.0, 0.1, 9.81])), freed(0.0), atol=1e-9)

@@ -1,5 +1,7 @@
 """Laws without a name in the feedforward: taken off where the catalogue's same law is, undone where a map can be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,13 +11,14 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from equalizer.tracking.compensation.effect_compensation import compensate
+from equalizer.tracking.compensation.effect_compensation import compensate, find_effect_axes
 from equalizer.tracking.compensation.law_compensation import (
     HAS_MEMORY,
     NOT_INVERTIBLE,
     NOT_OF_MOTION_ALONE,
     NOT_OF_OWN_COMMAND_ALONE,
     SENSOR_ERROR,
+    explain_law_not_compensated,
 )
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 
@@ -163,3 +166,35 @@ def test_what_cannot_be_compensated_says_why(text, acts_on, why):
     done = compensate(PUSHED, WANTED, MODEL, known, None)
     assert done.not_used == ((known.effects[0], why),)
     assert done.forces == pytest.approx(PUSHED)
+
+
+@pytest.mark.parametrize(("axis", "inputs"), [("u", ("u",)), ("m2", ("m1", "m2")), ("x", ("a", "x"))])
+def test_a_command_map_is_of_its_own_axis_also_where_channels_are_not_named_by_letters(axis, inputs):
+    """A formula calls the commands fx, fy, fz in their order."""
+    own, other = f"f{'xyz'[len(inputs) - 1]}", "fx"
+    law = parse_law(f"{own} + 0.1*{own}*abs({own})", "command", axis)
+    assert explain_law_not_compensated(law, inputs) == ""
+    if other != own:
+        law = parse_law(f"{other} + 0.1*{other}*abs({other})", "command", axis)
+        assert explain_law_not_compensated(law, inputs) == NOT_OF_OWN_COMMAND_ALONE
+
+
+TURNED = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("text", ["-5.0*vy*abs(vy) - 30.0*y", "-30.0*vx*x"])
+def test_the_motion_of_a_turned_sensor_is_turned_back_to_the_axes(text):
+    """The sensor's first channel measures the axis y, its second one -x."""
+    straight = physics(found(text))
+    along_axes = compensate(PUSHED, WANTED, MODEL, straight, None).forces
+    turned = replace(straight, output=TURNED)
+    by_sensor = compensate(PUSHED, WANTED @ TURNED.T, MODEL, turned, None).forces
+    assert np.std(along_axes - PUSHED) > 0
+    assert by_sensor == pytest.approx(along_axes, abs=1e-9)
+
+
+def test_an_axis_is_found_by_its_command_where_responses_have_another_order():
+    effect = found("-5.0*vy")
+    assert find_effect_axes(effect, ("fx", "fy"), ("ay", "ax")) == (1,)
+    assert find_effect_axes(effect, ("m1", "m2"), ("ay", "ax")) == (0,)
+    assert find_effect_axes(replace(effect, axis="a"), ("ba", "a"), ("s", "t")) == (1,)

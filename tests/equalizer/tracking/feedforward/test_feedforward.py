@@ -83,3 +83,9 @@ def test_a_table_with_gaps_is_refused_as_such(model, noise):
     samples[700, 1] = np.nan
     with pytest.raises(TrackingError, match="the trajectory holds values that are not finite numbers; fill the gaps"):
         compute_feedforward_forces(model, acceleration(samples))
+
+
+def test_channels_in_another_order_are_refused(model, noise):
+    turned = replace(noise, channels=model.output_channels[::-1])
+    with pytest.raises(ValueError, match="put them in the same order"):
+        compute_feedforward_forces(model, turned)

@@ -105,6 +105,26 @@ def test_the_page_shows_transfer_functions_bands_and_the_choice_of_order(device,
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_a_page_of_a_device_whose_coupling_cannot_be_judged_says_why(plants, tmp_path, outputs):
+    """Two outputs of a single force have no coupling; at 60 Hz the direction limit of 35 Hz was not measured."""
+    wave = np.tile(plants.sweep(4.5, 25.0, seconds=10.0), 2)[:, None]
+    rate_hz = 1000.0 if outputs == 2 else 60.0
+    force = Signal(wave, rate_hz, "force", "N", ("fx",))
+    accelerations = np.roll(wave, 1, axis=0) * np.arange(1, outputs + 1)
+    accelerations += 1e-3 * np.random.default_rng(1).standard_normal(accelerations.shape)
+    response = Signal(accelerations, rate_hz, "acceleration", "m/s^2", ("ax", "ay")[:outputs])
+    segments = (Segment(0, len(wave), "sweep", 1.0, len(wave) // 2),)
+    write_recording(tmp_path / "one.h5", Recording("bench", force, response, segments=segments))
+    band_hz = (5.0, 20.0) if outputs == 2 else (0.4, 1.2)
+    plan = IdentifyPlan((tmp_path / "one.h5",), tmp_path / "m.h5", band_hz=band_hz, order=2)
+    text = report_identification(
+        identify_model(plan, lambda share: None), tmp_path / "page", lambda _: None
+    ).read_text()
+    assert ("there are 2 outputs and 1 inputs" if outputs == 2 else "No onset of coupling was found") in text
+    assert not list((tmp_path / "page" / "figures").glob("frequency-bands*"))
+
+
 def refused(plan) -> StudyError:
     with pytest.raises(StudyError) as refusal:
         identify_model(plan, lambda share: None)

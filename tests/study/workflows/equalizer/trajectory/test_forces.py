@@ -27,6 +27,14 @@ def test_the_forces_of_a_table_make_the_device_do_it_row_by_row(plants, plan):
     assert summarise_equalization(done)["peak_n"] <= 3.0
 
 
+def test_a_table_at_a_rate_that_is_no_whole_number_is_played(plants, plan, tmp_path):
+    model = replace(model_of(plants.omega_like(0.1)), sample_rate_hz=999.7)
+    write_identified_model(tmp_path / "odd.h5", model)
+    write_trajectory(tmp_path / "odd.csv", table(noise(plants), 999.7))
+    done = equalize_trajectory(replace(plan, models=(tmp_path / "odd.h5",), trajectory=tmp_path / "odd.csv"))
+    assert done.feedforward.error < 0.01
+
+
 def test_what_is_left_out_is_reported(plants, plan, tmp_path):
     t = np.arange(2000)[:, None] / RATE_HZ
     write_trajectory(tmp_path / "whistle.csv", table(noise(plants) + np.sin(2 * np.pi * 84 * t)))
