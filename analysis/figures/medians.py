@@ -18,6 +18,7 @@ from analysis.figures.style import (
     GREY,
     PAGE_WIDTH_IN,
     choose_colour,
+    choose_height_in,
     choose_marker,
     create_figure,
     set_ratio_ticks,
@@ -44,11 +45,12 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     A threshold above the cap has no known size: participants are drawn on a common line with an arrow, and a median as
     an arrow that begins at its one-sided lower bound (below it near the end of the axis), without one at the lower end
     of the axis. cap_n: largest force of the staircase, N."""
-    figure = create_figure(PAGE_WIDTH_IN, 4.2)
+    legend_handles = _make_legend_handles(primary, cap_n)
+    figure = create_figure(PAGE_WIDTH_IN, choose_height_in(legend_handles, 4.2))
     axes = figure.add_subplot()
     style_axes(axes)
     axes.set_yscale("log")
-    top_n, bottom_n = _compute_upper_limit_n(primary, cap_n), _compute_lower_limit_n(primary)
+    top_n, bottom_n = _compute_upper_limit_n(primary, cap_n), _compute_lower_limit_n(primary, cap_n)
     axes.set_ylim(bottom_n, top_n)
     set_ratio_ticks(axes.yaxis, bottom_n, cap_n)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
@@ -64,7 +66,7 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     axes.set_xlim(-0.6, len(primary.frequencies_hz) - 0.4)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
-    figure.legend(handles=_make_legend_handles(primary, cap_n), loc="outside right upper", fontsize=8.5, frameon=False)
+    figure.legend(handles=legend_handles, loc="outside right upper", fontsize=8.5, frameon=False)
     return figure
 
 
@@ -78,10 +80,11 @@ def _compute_upper_limit_n(primary: PrimaryAnalysis, cap_n: float) -> float:
     )
 
 
-def _compute_lower_limit_n(primary: PrimaryAnalysis) -> float:
-    """Compute the lower end of the axis in N: 15 % below all thresholds and lower bounds."""
+def _compute_lower_limit_n(primary: PrimaryAnalysis, cap_n: float) -> float:
+    """Compute the lower end of the axis in N: 15 % below the cap, all thresholds and all lower bounds, so that the cap
+    is shown also where all thresholds lie above it."""
     thresholds_n = [threshold_n for person in primary.persons for threshold_n in person.thresholds_n]
-    return 0.85 * min(*thresholds_n, *(median.lower_n or median.newton for median in primary.medians))
+    return 0.85 * min(cap_n, *thresholds_n, *(median.lower_n or median.newton for median in primary.medians))
 
 
 def _draw_person(

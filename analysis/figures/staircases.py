@@ -51,7 +51,8 @@ def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
 
 
 def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule) -> None:
-    """Draw the levels, answers, reversals and threshold of a run; without a threshold where the run is not complete."""
+    """Draw the levels, answers, reversals and threshold of a run; without a threshold where the run is not complete.
+    The title has 9 points: at 10, the longest outcome would reach into the next panel."""
     style_axes(axes)
     levels_n = np.array([trial.staircase_n for trial in run.answered])
     trial_numbers = np.arange(1, len(levels_n) + 1)
@@ -90,7 +91,7 @@ def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule) -> None:
             zorder=3,
         )
     axes.set_yscale("log")
-    axes.set_title(f"{run.frequency_hz:g} Hz{_describe_outcome(threshold)}", fontsize=10, loc="left")
+    axes.set_title(f"{run.frequency_hz:g} Hz{_describe_outcome(threshold)}", fontsize=9, loc="left")
 
 
 def _describe_outcome(threshold: Threshold) -> str:

@@ -15,6 +15,7 @@ from analysis.figures.style import (
     GREY,
     PAGE_WIDTH_IN,
     choose_colour,
+    choose_height_in,
     choose_marker,
     create_figure,
     draw_no_data_note,
@@ -38,7 +39,8 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     table: thresholds in newtons; where it has no participant, the figure contains a note. comparisons: of the same
     table; without intervals, means are drawn alone. cap_n: largest force of the study (N), a dashed line.
     """
-    figure = create_figure(PAGE_WIDTH_IN, 4.2)
+    legend_handles = _make_legend_handles(table, comparisons)
+    figure = create_figure(PAGE_WIDTH_IN, choose_height_in(legend_handles, 4.2))
     if not table.subjects:
         return draw_no_data_note(figure, "There is no completed run to draw.")
     axes = figure.add_subplot()
@@ -59,9 +61,7 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     axes.set_ylim(0, 1.15 * cap_n)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
-    figure.legend(
-        handles=_make_legend_handles(table, comparisons), loc="outside right upper", fontsize=8.5, frameon=False
-    )
+    figure.legend(handles=legend_handles, loc="outside right upper", fontsize=8.5, frameon=False)
     return figure
 
 

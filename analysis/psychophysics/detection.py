@@ -40,8 +40,12 @@ def compute_detection_thresholds(trials: Iterable[Trial], protocol: StudyProtoco
 
     Raises InconsistentTrialsError (a ValueError) where the trials contradict the staircase rule.
     """
+    detection_trials = [trial for trial in trials if trial.phase is Phase.DETECTION]
+    if not detection_trials:
+        # Without detection runs there may be no rule: the cap may be below the default of detection.start_n.
+        return ()
     rule = make_staircase_rule(protocol, Phase.DETECTION)
-    thresholds = (compute_run_threshold(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
+    thresholds = (compute_run_threshold(run, rule) for run in recompute_runs(detection_trials, rule, Phase.DETECTION))
     # The decision depends on the difference of two intervals, whose variance is twice that of one.
     return tuple(
         threshold if threshold.d_prime is None else replace(threshold, d_prime=threshold.d_prime / math.sqrt(2))

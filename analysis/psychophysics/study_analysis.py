@@ -284,7 +284,7 @@ def describe_design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> 
         "The published analysis is one-way: it treats every threshold as that of another person, so differences "
         f"between people count as error: {format_f_text(anova.df_between, anova.df_within, anova.f)}, "
         f"{format_p_text(anova.p)}. "
-        "Every participant was tested at every frequency; the analysis within participants removes those differences "
+        "The analysis within participants takes those with thresholds at all frequencies, and removes such differences "
         f"({_format_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
         f"{format_f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
         f"{within.epsilon:.2f}, {format_p_text(within.p)}. "

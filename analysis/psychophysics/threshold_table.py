@@ -97,8 +97,9 @@ def tabulate_thresholds(
             notes.append(f"{row.subject} has a run at {row.frequency_hz:g} Hz, which the protocol does not name.")
         elif row.complete and cell in first_runs:
             notes.append(
-                f"{row.subject} completed more than one run at {row.frequency_hz:g} Hz; the first one counts "
-                f"(session {first_runs[cell].session}), not run {row.run} of session {row.session}."
+                f"{row.subject} completed more than one run at {row.frequency_hz:g} Hz; the threshold is that of the "
+                f"first (session {first_runs[cell].session}), not of run {row.run} of session {row.session}. A model "
+                "of all answers takes the answers of both."
             )
         elif row.complete:
             first_runs[cell] = row

@@ -17,7 +17,7 @@ from analysis.diagnosis.unit_wording import choose_scale
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, create_figure, draw_no_data_note, style_axes
 from analysis.wording import capitalise, typeset
-from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 _BANDWIDTH_NOTE = " Noise limits the bandwidth of the missing force, so corners look rounder than they are."
@@ -36,9 +36,9 @@ def make_signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, .
             caption="Dots: residual of the model with all other effects found but without this one, mean per bin; "
             "bars: two standard errors. "
             + (
-                "Line: the formula."
-                if signature.effect == DISCOVERED_LAW
-                else "Line: the fitted law, simulated and averaged alike."
+                "Line: the fitted law, simulated and averaged alike."
+                if signature.effect in EFFECTS_BY_NAME
+                else "Line: the formula."  # of a discovered law, or one from an effect file
             )
             + (_BANDWIDTH_NOTE if signature.ordinate_label.startswith("missing") else "")
             + (_EXTRAPOLATION_NOTE if signature.visited_range else ""),

@@ -50,7 +50,7 @@ class AnswerRegression:
     residual_sd_db: float
     """Standard deviation of the residuals; 0 without trials."""
     slope: float | None
-    """g, in logits per dB: positive where more of the cue goes with answers of the first direction. None without
+    """g, in logits per dB: positive where more of the cue goes with answers of the direction of side +1. None without
     trials, where the delivery did not vary within a direction, or where the answers do not determine it."""
     lower: float | None
     upper: float | None

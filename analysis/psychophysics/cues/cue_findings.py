@@ -35,7 +35,7 @@ class CueFinding:
     people: tuple[CueSensitivity, ...]
     """Sensitivities of the participants by this cue; at least one."""
     difference_db: float
-    """Median of the participants' differences, first direction minus second by angle."""
+    """Median of the participants' differences, the direction of side +1 minus the other (`DeliveredTrials.side`)."""
     largest_db: float
     """Difference of the participant with the largest magnitude of it, with its sign."""
     spread_db: float

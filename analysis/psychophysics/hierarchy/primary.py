@@ -168,25 +168,35 @@ def _compare_frequencies(
         fit.answers.has_enough_answers,
         compute_pseudo_thresholds(fit),
     )
-    is_far_above_cap = fit.means_db > cap_db + FAR_ABOVE_DB
-    far_above_hz = tuple(
-        frequency_hz for frequency_hz, is_above in zip(frequencies_hz, is_far_above_cap, strict=True) if is_above
-    )
+    far_above_hz = _find_far_above_hz(fit, cap_db)
+    is_far_above_cap = np.isin(frequencies_hz, far_above_hz)
     # Contrasts are against the first frequency: if it is far above the cap, others far above it have no contrast.
     determined = ~(is_far_above_cap & is_far_above_cap[0]) | (np.arange(len(is_far_above_cap)) == 0)
-    declared = None
-    if not set(declared_hz) <= set(far_above_hz):
-        declared = compute_pair_contrast(
-            frequencies_hz, pseudo_thresholds_db, declared_hz, confidence, has_enough_answers
-        )
     overall, converged = _test_frequency_effect(fit.answers, pseudo_thresholds_db, fit.family, is_far_above_cap)
     return _FrequencyComparison(
         overall=overall,
         contrasts=compute_contrasts(frequencies_hz, pseudo_thresholds_db, confidence, has_enough_answers & determined),
-        declared=declared,
+        declared=compare_pair(fit, declared_hz, cap_db, confidence),
         far_above_hz=far_above_hz,
         converged=converged,
     )
+
+
+def compare_pair(fit: HierarchicalFit, pair_hz: Sequence[float], cap_db: float, confidence: float) -> Contrast | None:
+    """Compute the contrast of two frequencies by pseudo-thresholds, first minus second; None where both medians are far
+    above the cap (`FAR_ABOVE_DB`), and where `compute_pair_contrast` gives none. cap_db: cap in dB re 1 N."""
+    if set(pair_hz) <= set(_find_far_above_hz(fit, cap_db)):
+        return None
+    answers = fit.answers
+    return compute_pair_contrast(
+        answers.frequencies_hz, compute_pseudo_thresholds(fit), pair_hz, confidence, answers.has_enough_answers
+    )
+
+
+def _find_far_above_hz(fit: HierarchicalFit, cap_db: float) -> tuple[float, ...]:
+    """Find the frequencies whose medians lie more than `FAR_ABOVE_DB` above the cap."""
+    is_far_above_cap = fit.means_db > cap_db + FAR_ABOVE_DB
+    return tuple(hz for hz, is_above in zip(fit.answers.frequencies_hz, is_far_above_cap, strict=True) if is_above)
 
 
 def _test_frequency_effect(

@@ -43,16 +43,16 @@ class RuleResult:
 
     rule: str
     runs: int
-    """Number of runs that ended with a threshold. Errors are over these; NaN without such runs."""
+    """Number of runs that ended with a threshold. Errors are over these; None without such runs."""
     trials: float
     """Mean number of trials per run, over all runs."""
-    bias_db: float
+    bias_db: float | None
     """Mean error of one run's estimate, estimated minus true threshold."""
-    sd_db: float
+    sd_db: float | None
     """Standard deviation of that error."""
-    error_db: float
+    error_db: float | None
     """Root mean square error of one run's estimate."""
-    error_per_trial_db: float
+    error_per_trial_db: float | None
     """`error_db` times the square root of `trials` (see the module): error of an equally efficient run of one trial."""
     highest_n: float
     """Highest amplitude played in any run, N."""
@@ -71,7 +71,8 @@ class SimulatedPerson(NamedTuple):
 
 def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
     """List the rules to compare, by name: the protocol's up-down rule with each interpretation of its change of step
-    (`StepChange`), and Psi with 30 and with 60 trials."""
+    (`StepChange`), and Psi with 30 and with 60 trials, to which the first step and the trial limit of the protocol's
+    rule do not apply."""
     names = {
         StepChange.AFTER_REVERSAL: "staircase, new step after the reversal",
         StepChange.AT_REVERSAL: "staircase, new step at the reversal",
@@ -80,7 +81,9 @@ def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
     up_down = replace(rule, bayesian=BayesianPlacement())
     rules = {name: replace(up_down, step_change=change) for change, name in names.items()}
     for trials in (30, 60):
-        rules[f"Psi, {trials} trials"] = replace(rule, bayesian=BayesianPlacement(trials))
+        rules[f"Psi, {trials} trials"] = replace(
+            rule, bayesian=BayesianPlacement(trials), initial_one_up_one_down=False, trial_limit=0
+        )
     return rules
 
 
@@ -99,16 +102,15 @@ def _evaluate_rule(name: str, rule: StaircaseRule, crowd: Crowd, people: int, se
         highest_n = max(highest_n, run_highest_n)
         if is_complete(rule, state):
             errors_db.append(estimate_db(rule, state) - true_db)
-    error_array_db = np.array(errors_db) if errors_db else np.array([math.nan])
-    rms_error_db = float(np.sqrt((error_array_db**2).mean()))
+    rms_error_db = float(np.sqrt(np.mean(np.square(errors_db)))) if errors_db else None
     return RuleResult(
         rule=name,
         runs=len(errors_db),
         trials=float(np.mean(trial_counts)),
-        bias_db=float(error_array_db.mean()),
-        sd_db=float(error_array_db.std()),
+        bias_db=float(np.mean(errors_db)) if errors_db else None,
+        sd_db=float(np.std(errors_db)) if errors_db else None,
         error_db=rms_error_db,
-        error_per_trial_db=rms_error_db * math.sqrt(float(np.mean(trial_counts))),
+        error_per_trial_db=None if rms_error_db is None else rms_error_db * math.sqrt(float(np.mean(trial_counts))),
         highest_n=highest_n,
     )
 

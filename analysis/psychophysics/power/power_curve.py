@@ -18,9 +18,10 @@ from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.group_contrasts import compute_pair_contrast
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds
+from analysis.psychophysics.hierarchy.primary import compare_pair
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule
+from protocols.procedure.staircase import to_db
 
 CONFIDENCE = 0.95
 """Confidence of the contrasts' intervals; every test has the level 1 - CONFIDENCE."""
@@ -35,8 +36,9 @@ class StudyVerdict:
     trials: int
     """Number of trials of all people together."""
     primary_found: bool
-    """Whether the hierarchical model of all answers finds the difference, by a t test over people. False where the
-    differences of all people are equal, so that no test is possible; also in `primary_covers` and `means_found`."""
+    """Whether the hierarchical model of all answers finds the difference, by a t test over people. False where no test
+    is possible, because the differences of all people are equal or, by the model, both medians are far above the cap
+    (`hierarchy.primary.FAR_ABOVE_DB`); also in `primary_covers` and `means_found`."""
     primary_covers: bool
     """Whether the model's 95 % interval contains the true difference."""
     primary_error_db: float
@@ -88,11 +90,9 @@ def judge_study(
     pair_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
     first_column, second_column = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
     true_difference_db = compute_true_difference_db(crowd, contrast_hz)
-    pseudo_thresholds_db = compute_pseudo_thresholds(fit_hierarchy(study.answers))
-    primary_contrast, means_contrast = (
-        compute_pair_contrast(crowd.frequencies_hz, values_db, pair_hz, CONFIDENCE)
-        for values_db in (pseudo_thresholds_db, study.threshold_db)
-    )
+    fit = fit_hierarchy(study.answers)
+    primary_contrast = compare_pair(fit, pair_hz, to_db(rule.cap_n), CONFIDENCE)
+    means_contrast = compute_pair_contrast(crowd.frequencies_hz, study.threshold_db, pair_hz, CONFIDENCE)
     group_names = [f"{group_hz:g} Hz" for group_hz in crowd.frequencies_hz]
     anova = compute_one_way_anova(
         {name: list(column) for name, column in zip(group_names, study.threshold_n.T, strict=True)}
@@ -107,8 +107,7 @@ def judge_study(
         primary_found=primary_contrast is not None and primary_contrast.p < 1.0 - CONFIDENCE,
         primary_covers=primary_contrast is not None
         and primary_contrast.lower_db <= true_difference_db <= primary_contrast.upper_db,
-        primary_error_db=float((pseudo_thresholds_db[:, first_column] - pseudo_thresholds_db[:, second_column]).mean())
-        - true_difference_db,
+        primary_error_db=float(fit.means_db[first_column] - fit.means_db[second_column]) - true_difference_db,
         means_found=means_contrast is not None and means_contrast.p < 1.0 - CONFIDENCE,
         means_error_db=float((study.threshold_db[:, first_column] - study.threshold_db[:, second_column]).mean())
         - true_difference_db,

@@ -5,7 +5,8 @@ appended to `studies.jsonl`, so that an interrupted simulation continues; power.
 """
 
 import json
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from analysis.psychophysics.power.power_curve import (
     summarise_power,
 )
 from analysis.psychophysics.power.simulated_study import Crowd
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
 from analysis.threshold_words import REVERSAL_WORDS, select_threshold_words
 from protocols.definition.staircase_rule import StaircaseRule
 from study.errors import StudyError, WrongUseError
@@ -72,8 +74,8 @@ def simulate_power(
     on_finished: called with the number of finished studies. The same seed gives the same results on any executor;
     `folder` may contain an interrupted run.
 
-    Raises WrongUseError for a trial limit without the Psi method, StudyError where `folder` belongs to another plan,
-    and CannotWriteError."""
+    Raises WrongUseError for a trial limit without the Psi method and for runs that do not end, StudyError where
+    `folder` belongs to another plan, and CannotWriteError."""
     if plan.rule.trial_limit and not plan.rule.is_bayesian:
         raise WrongUseError(
             "This staircase has a trial limit",
@@ -95,22 +97,32 @@ def simulate_power(
         _append_json_line(progress_path, {"piece": chunk, "verdicts": [asdict(verdict) for verdict in verdicts]})
         finished_count += len(verdicts)
         on_finished(finished_count)
-    # In the order of the plan, not in the order of finishing, so that rounding of sums is the same in every run.
-    points = tuple(
-        summarise_power(
-            [
-                verdict
-                for judged_chunk in sorted(verdicts_by_chunk)
-                if judged_chunk[0] == sample_size
-                for verdict in verdicts_by_chunk[judged_chunk]
-            ]
-        )
-        for sample_size in plan.people
-    )
+    points = tuple(_summarise_size(verdicts_by_chunk, sample_size) for sample_size in plan.people)
     payload = {"plan": _summarise_plan(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
     write_json(folder / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
     _write_figure(folder / "figures", plan, points)
     return points
+
+
+def _summarise_size(verdicts_by_chunk: Mapping[StudyChunk, Sequence[StudyVerdict]], sample_size: int) -> PowerPoint:
+    """Summarise the studies of one sample size. Raises WrongUseError where a simulated run did not end and so has no
+    threshold."""
+    # In the order of the plan, not in the order of finishing, so that rounding of sums is the same in every run.
+    verdicts = [
+        verdict
+        for chunk in sorted(verdicts_by_chunk)
+        if chunk[0] == sample_size
+        for verdict in verdicts_by_chunk[chunk]
+    ]
+    unended_count = sum(math.isnan(verdict.means_error_db) for verdict in verdicts)
+    if unended_count:
+        raise WrongUseError(
+            "Simulated runs did not end",
+            f"In {unended_count} of {len(verdicts)} studies a run did not reach its reversals in {MOST_TRIALS} trials.",
+            "Set fewer staircase.reversals or a smaller staircase.down_after_right, or give a lower --threshold-n.",
+            saved=f"The finished studies are kept in {PROGRESS_NAME}.",
+        )
+    return summarise_power(verdicts)
 
 
 def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -> None:

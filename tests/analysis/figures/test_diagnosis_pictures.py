@@ -8,12 +8,13 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.text import Annotation
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
+from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.result.residual_spectrum import compute_held_out_spectra
 from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
 from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, make_mismatch_map_picture
 from analysis.figures.diagnosis.residual_spectra import draw_residual_spectra
 from analysis.figures.diagnosis.rivals import draw_rivals, list_explanations, make_rivals_pictures
-from analysis.figures.diagnosis.signature import draw_signature
+from analysis.figures.diagnosis.signature import draw_signature, make_signature_pictures
 from analysis.figures.picture import render_picture_svg
 from analysis.figures.style import create_figure, format_power_of_ten, set_ratio_ticks
 
@@ -240,3 +241,15 @@ def test_powers_of_ten_are_written_out(value, words):
 def test_a_map_without_a_known_noise_says_so():
     figure = draw_mismatch_map({}, "fx", "N")
     assert [text.get_text() for text in figure.texts] == ["The noise is not known, so there is no map in its units."]
+
+
+@pytest.mark.parametrize(
+    ("effect", "line"),
+    [("coulomb_friction", "simulated and averaged"), ("discovered_law", "the formula"), ("oil_drag", "the formula")],
+)
+def test_the_caption_of_a_signature_says_whether_its_line_is_a_formula(effect, line):
+    """A law of an effect file has a name of its own."""
+    dots = np.linspace(-1.0, 1.0, 5)
+    signature = Signature(effect, "x", "velocity of x (m/s)", "missing force (N)", dots, dots, 0 * dots, dots, dots)
+    (picture,) = make_signature_pictures((signature,))
+    assert line in picture.caption.partition("Line: ")[2].partition(".")[0]

@@ -97,6 +97,17 @@ def test_the_arrow_of_a_bound_points_up_within_the_axis_however_high_the_bound_i
     assert begin == pytest.approx(bound_n) or top == 8.0 * CAP_N
 
 
+def test_where_all_are_above_the_cap_the_axis_shows_the_cap_and_points_up(primary):
+    """It began at 15 % below thresholds that are not drawn: above the cap, or even above its own upper end."""
+    persons = tuple(replace(person, thresholds_n=(90.0,) * 3, above_cap=(True,) * 3) for person in primary.persons)
+    medians = tuple(replace(each, db=39.0, lower_db=None, upper_db=None, above_cap=True) for each in primary.medians)
+    limit = replace(primary.limit, frequency_hz=None)
+    bottom, top = (
+        draw_medians(replace(primary, persons=persons, medians=medians, limit=limit), CAP_N).axes[0].get_ylim()
+    )
+    assert bottom < CAP_N < top
+
+
 def test_the_interval_of_a_median_near_the_cap_ends_within_the_axis(primary):
     wide = replace(primary.medians[1], upper_db=20.0 * np.log10(5.0))
     axes = draw_medians(replace(primary, medians=(primary.medians[0], wide, primary.medians[2])), CAP_N).axes[0]

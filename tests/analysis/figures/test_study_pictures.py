@@ -1,13 +1,19 @@
+import itertools
 from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from analysis.figures.picture import Picture
+from analysis.figures.staircases import draw_staircases
 from analysis.figures.study_pictures import draw_study_pictures
 from analysis.figures.style import MARKERS
+from analysis.psychophysics.runs import recompute_runs
 from analysis.psychophysics.study_analysis import analyse_study
+from tests.analysis.conftest import PUBLISHED
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +91,22 @@ def test_a_run_that_the_trial_limit_stopped_is_drawn_and_said(simulate_study, pr
     assert "by the trial limit" in figure_text(figure)
     titles = [axes.get_title(loc="left") for axes in pictures["staircases-1-s01"].figure.axes]
     assert "45 Hz (stopped by the trial limit)" in titles
+
+
+def test_titles_of_staircases_do_not_run_into_each_other(simulate):
+    """Those of two runs that the trial limit stopped did."""
+    rule = replace(PUBLISHED, trial_limit=12)
+    trials = [
+        trial
+        for run, hz in enumerate((5.0, 12.5, 35.0))
+        for trial in simulate(0.6, np.random.default_rng(run), rule=rule, run=run, frequency_hz=hz)
+    ]
+    figure = draw_staircases(recompute_runs(trials, rule), rule)
+    figure.draw_without_rendering()
+    titles = [text for text in figure.findobj(Text) if "stopped by the trial limit" in text.get_text()]
+    boxes = sorted((title.get_window_extent() for title in titles), key=lambda box: box.x0)
+    assert len(boxes) == 3
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
 
 
 def test_the_threshold_figure_says_its_units_cap_and_intervals(study_drawings):

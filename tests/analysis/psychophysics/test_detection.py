@@ -44,6 +44,15 @@ def test_the_detection_threshold_of_a_simulated_participant_is_recovered(simulat
     assert mean_db == pytest.approx(20 * np.log10(0.2), abs=0.8)
 
 
+def test_a_study_without_detection_may_have_a_cap_below_the_level_at_which_detection_would_begin(simulate, protocol):
+    """Its sessions ended with a traceback, and could not be analysed."""
+    rule = replace(protocol.staircase, cap_n=0.3, start_n=0.1)
+    weak = replace(protocol, staircase=rule)
+    assert weak.detection.start_n > rule.cap_n and not weak.detection.frequencies_hz
+    trials = simulate(0.1, np.random.default_rng(1), rule=rule)
+    assert compute_detection_thresholds(trials, weak) == ()
+
+
 def test_a_participant_who_feels_nothing_is_cut_by_the_cap(simulate_detection, detection_protocol):
     generator = np.random.default_rng(5)
     rows = compute_detection_thresholds(

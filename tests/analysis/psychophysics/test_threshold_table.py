@@ -37,8 +37,8 @@ def test_the_first_completed_run_counts_and_the_second_is_named(rows):
     table = tabulate_thresholds([*rows, again], FREQUENCIES)
     assert table.values == tabulate_thresholds(rows, FREQUENCIES).values
     assert table.notes == (
-        f"s01 completed more than one run at {rows[0].frequency_hz:g} Hz; the first one counts (session 1), "
-        "not run 1 of session 2.",
+        f"s01 completed more than one run at {rows[0].frequency_hz:g} Hz; the threshold is that of the first "
+        "(session 1), not of run 1 of session 2. A model of all answers takes the answers of both.",
     )
 
 

@@ -9,7 +9,9 @@ from analysis.psychophysics.cues.cue_findings import compute_cue_findings, make_
 from analysis.psychophysics.cues.cue_sensitivity import INTERNAL_NOISE_DB, fit_same_level_difference
 from analysis.psychophysics.cues.delivered_cues import Cue, _convert_to_db, find_cue_gaps, select_delivered_trials
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
+from analysis.reports.cue_section import make_cue_sections
 from analysis.reports.study_report import render_study_report
+from tests.analysis.conftest import PUBLISHED
 from tests.slow_instances import slow
 
 SCATTER_DB = 0.3
@@ -83,8 +85,13 @@ def test_swapped_labels_do_not_cancel_a_difference_of_the_device(simulate_study)
         plus = (trial.direction_shown == 1) != swapped
         strength = 4.0 * trial.level_n * (2.0 if plus else 1.0)
         trials.append(replace(trial, angle_deg=45.0 if plus else -45.0, delivered_mps2=strength))
-    first = next(each for each in compute_cue_findings(trials) if each.cue is Cue.INTENSITY)
+    found = compute_cue_findings(trials)
+    first = next(each for each in found if each.cue is Cue.INTENSITY)
     assert [each.difference_db for each in first.people] == pytest.approx([-20 * np.log10(2.0)] * 4)
+    # The stronger one is direction 1 of the protocol: the page must say what is subtracted from what.
+    (section,) = make_cue_sections(found, (), PUBLISHED)
+    assert section.tables[0].notes[0].startswith("Difference: direction at the smaller angle minus that at the larger")
+    assert "Positive: more of the cue with answers of the direction at the smaller angle" in section.tables[1].notes[0]
 
 
 def test_labels_may_be_the_other_way_round_in_a_second_session_of_the_same_person(simulate_study):

@@ -1,7 +1,7 @@
 """Psi on simulated people, and rules compared on the same people: recovery, ends, guessers, and the command."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -67,6 +67,20 @@ def test_the_same_seed_compares_the_same_people():
     one, other, psi = compare_rules(Crowd((5.0,), (0.7,)), rules, 10, 3)
     assert replace(one, rule="") == replace(other, rule="")
     assert compare_rules(Crowd((5.0,), (0.7,)), {"c": RULE}, 10, 3) == (psi,)
+
+
+@pytest.mark.parametrize("change", [{"initial_one_up_one_down": True}, {"trial_limit": 15}])
+def test_what_a_protocol_sets_for_its_staircase_does_not_hold_for_psi(change):
+    """The first was a traceback; the second stopped every run of Psi, and NaN is no JSON."""
+    rules = list_compared_rules(replace(PUBLISHED, **change))
+    staircase, psi = compare_rules(
+        Crowd((5.0,), (0.7,)), {name: rules[name] for name in (RULES[0], "Psi, 30 trials")}, 2, 3
+    )
+    assert (psi.runs, psi.trials) == (2, 30.0) and psi.error_db > 0
+    stopped = "trial_limit" in change
+    assert staircase.runs == (0 if stopped else 2)
+    assert (staircase.error_db is None) == (staircase.bias_db is None) == stopped
+    assert json.loads(json.dumps(asdict(staircase), allow_nan=False))["runs"] == staircase.runs
 
 
 def test_sessions_analyse_such_runs(simulate):

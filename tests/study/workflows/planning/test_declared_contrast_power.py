@@ -9,6 +9,7 @@ import pytest
 
 from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.comparisons import compare_group_means
+from analysis.psychophysics.hierarchy.primary import compute_primary_analysis
 from analysis.psychophysics.power.power_curve import compute_true_difference_db, judge_study
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
@@ -39,6 +40,15 @@ def test_every_analysis_judges_the_declared_pair():
     tukey = {(pair.first, pair.second): pair.p for pair in compare_group_means(compute_one_way_anova(groups)).pairs}
     assert by_pair[45.0, 35.0].published_found == (tukey["35 Hz", "45 Hz"] < 0.05)
     assert by_pair[()].published_found == (tukey["5 Hz", "45 Hz"] < 0.05)
+
+
+def test_a_difference_that_the_report_does_not_give_is_not_found():
+    """Of two medians far above the cap; such studies without a difference counted as having found one."""
+    crowd = Crowd((5.0, 45.0), (15.0, 15.0))
+    found = compute_primary_analysis(simulate_study(crowd, RULE, 6, (1,)).answers, RULE.cap_n, declared_hz=(45.0, 5.0))
+    assert found.far_above_hz == (5.0, 45.0) and found.declared_contrast is None
+    verdict = judge_study(crowd, RULE, 6, (1,))
+    assert not verdict.primary_found and not verdict.primary_covers
 
 
 @pytest.mark.slow

@@ -146,6 +146,13 @@ def test_a_trial_limit_is_refused(run):
         run(replace(PLAN, rule=replace(RULE, trial_limit=50)))
 
 
+def test_runs_that_do_not_end_are_refused(run):
+    """After nine right answers in a row the level falls: a threshold above the cap is a run of thousands of trials."""
+    rule = replace(RULE, down_after_right=9)
+    with pytest.raises(WrongUseError, match="did not reach its reversals in 2000 trials"):
+        run(replace(PLAN, crowd=Crowd((5.0, 45.0), (5.0, 5.0)), rule=rule, people=(3,), studies=2))
+
+
 def test_sample_sizes_are_read():
     assert parse_sample_sizes("5:40:5") == (5, 10, 15, 20, 25, 30, 35, 40)
     assert parse_sample_sizes("12") == (12,)
