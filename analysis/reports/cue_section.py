@@ -80,10 +80,10 @@ def _tabulate_sensitivity(findings: Sequence[CueFinding], d_prime_note: str) -> 
             for finding in findings
         ),
         notes=(
-            "Difference: first direction minus second, by their angles; medians over participants, and the largest of "
-            "any. Spread: standard deviation over trials of one direction at one level, roving included. d' = "
-            "difference over internal noise and spread (root of the sum of squares), for three internal noises; d' = 1 "
-            "is one just noticeable difference.",
+            "Difference: direction at the smaller angle minus that at the larger (without angles: number 1 minus 2); "
+            "medians over participants, and the largest of any. Spread: standard deviation over trials of a direction "
+            "at one level, roving included. d' = difference over internal noise and spread (root of the sum of "
+            "squares), for three internal noises; d' = 1 is one just noticeable difference.",
             f"Noticeable: shown, by a 95 % interval of the difference, to reach d' 1 at an internal noise of "
             f"{TYPICAL_NOISE_DB:g} dB. {d_prime_note}",
         ),
@@ -105,7 +105,8 @@ def _tabulate_regressions(findings: Sequence[CueFinding]) -> Table:
         ),
         notes=(
             "Logistic regression of answers on each trial's deviation from the others of that participant, direction "
-            "and level. "
+            "and level. Positive: more of the cue with answers of the direction at the smaller angle (without angles: "
+            "number 1). "
             f"A participant with an internal noise of {TYPICAL_NOISE_DB:g} dB who answers by the cue alone has "
             f"{format_number(CUE_ONLY_SLOPE, 1)} logits per dB; a participant who answers by the direction has 0.",
         ),

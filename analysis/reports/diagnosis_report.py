@@ -6,7 +6,7 @@ This module decides the sections and their order; most sentences come from `anal
 
 from collections.abc import Mapping, Sequence
 
-from analysis.diagnosis.document import NamedEffect
+from analysis.diagnosis.document import NamedEffect, format_law
 from analysis.diagnosis.localisation.localisation_words import write_localisation_sentences
 from analysis.diagnosis.result.error_wording import (
     describe_black_box,
@@ -18,7 +18,6 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.plausibility import describe_doubts
 from analysis.diagnosis.result.retuned_parameters import describe_doubtful_parameters, describe_retuning
 from analysis.diagnosis.result.wording import (
-    collect_signature_texts,
     describe_effect,
     describe_equivalents,
     describe_next_experiment,
@@ -27,9 +26,12 @@ from analysis.diagnosis.result.wording import (
     describe_share,
     extract_device,
     find_final_moves,
+    find_fitted_effect,
     format_effect_title,
+    get_signature_text,
     write_answer,
 )
+from analysis.diagnosis.unit_wording import typeset_unit
 from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_distortion import make_distortion_sections
 from analysis.reports.diagnosis_method import write_method_paragraphs
@@ -90,12 +92,11 @@ def _join_doubts(findings: Findings) -> str:
 
 def _make_answer_sections(findings: Findings) -> list[Section]:
     """Make the section on the named effects: one point each, what remains and the next experiment; or none."""
-    effects, signatures = findings.diagnosis.effects, collect_signature_texts(findings)
+    effects = findings.diagnosis.effects
     if not effects:
         return []
     points = [
-        " ".join(filter(None, (_describe_effect(findings, effect, signatures), describe_equivalents(effect))))
-        for effect in effects
+        " ".join(filter(None, (_describe_effect(findings, effect), describe_equivalents(effect)))) for effect in effects
     ]
     closing_sentences = [
         describe_remainder(findings.diagnosis, extract_device(findings)),
@@ -136,10 +137,12 @@ def _make_effect_section(findings: Findings, effect_index: int, pictures: Sequen
     """Make the section on the effect with this index (from 0): equation, source, rivals, signature curves and
     parameters."""
     effect = findings.diagnosis.effects[effect_index]
-    catalogue_effect = next((match.effect for match in findings.named if match.effect.name == effect.effect), None)
+    fitted_effect, force_unit = find_fitted_effect(findings, effect), typeset_unit(findings.given.system.force)
     paragraphs = [describe_share(effect)]
-    if catalogue_effect is not None:
-        paragraphs += [f"Equation: {catalogue_effect.equation}.", f"Source: {catalogue_effect.source}."]
+    if fitted_effect is not None:
+        # The equation of a law has the numbers from which its fit started.
+        equation = fitted_effect.effect.equation if effect.law is None else format_law(effect.law, force_unit)
+        paragraphs += [f"Equation: {equation}.", f"Source: {fitted_effect.effect.source}."]
     rivals = describe_rivals(effect)
     if not rivals and not describe_equivalents(effect):
         paragraphs.append("No rival fits nearly as well.")
@@ -217,9 +220,9 @@ def _make_sentence_sections(heading: str, sentence: str) -> list[Section]:
     return [Section(heading, paragraphs=(sentence,))] if sentence else []
 
 
-def _describe_effect(findings: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
-    """Describe a named effect with the text on its signature, if it has one. signatures: texts by effect name."""
-    return describe_effect(effect, signatures.get(effect.effect, ""), extract_device(findings))
+def _describe_effect(findings: Findings, effect: NamedEffect) -> str:
+    """Describe a named effect with the text on its signature, if it has one."""
+    return describe_effect(effect, get_signature_text(findings, effect), extract_device(findings))
 
 
 def _has_single_input(findings: Findings) -> bool:

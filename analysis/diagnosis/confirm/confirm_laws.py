@@ -88,7 +88,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise
         for axis, balance in enumerate(balances)
         for law in balance.named
         if law.law.effect != CONSTANT_FORCE
-        and can_be_simulated(balance.search.regression.base_terms.driven_channel, law)
+        and can_be_simulated(balance.search.regression.base_terms.driven_channel, law, context.tuning.model.units)
     ]
     if not named_laws:
         return None
@@ -196,9 +196,9 @@ def _fit_steps(
     deviations: starting values of the model's parameters, in standard deviations from the given ones."""
     hypothesis = retuned.fitted.hypothesis
     steps = [retuned for _ in hypothesis.claims]
-    recording = context.measure.records[0].recording
+    recording, units = context.measure.records[0].recording, context.tuning.model.units
     for axis, law in named_laws:
-        extended = combine_hypotheses(hypothesis, make_hypothesis(axis, law, recording))
+        extended = combine_hypotheses(hypothesis, make_hypothesis(axis, law, recording, units))
         start = evaluate_fit(context.measure, context.tuning, deviations, extended)
         fitted = refine(context, start)
         steps.append(context.score_fit(fitted))

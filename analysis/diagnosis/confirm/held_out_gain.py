@@ -2,6 +2,7 @@
 
     gain = 1 - mean over channels of (E_with / E_without),    E: sum of squared residuals on held-out samples
 
+Channels that contain only noise without and with the effect are not counted (`_find_channels_above_noise`).
 No model of a real device reaches the sensors' noise, so an effect is judged by its prediction of held-out samples, not
 by the residual in units of noise. Stretches are resampled as blocks, because residuals are correlated (Kunsch, Ann.
 Stat. 17:1217, 1989).
@@ -21,6 +22,7 @@ from analysis.diagnosis.limits import (
     LEAST_HELD_OUT_STRETCHES,
 )
 from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 
@@ -48,9 +50,10 @@ def estimate_held_out_gain(
         return None
     # Each channel in units of its residual without the effect, so that no channel dominates.
     channel_powers = np.maximum(powers_without.sum(axis=0), np.finfo(float).tiny)
+    counted = _find_channels_above_noise(measure, np.maximum(powers_without, powers_with).sum(axis=0))
     scaled_without, scaled_with = (
-        (powers_without / channel_powers).mean(axis=1),
-        (powers_with / channel_powers).mean(axis=1),
+        (powers_without / channel_powers)[:, counted].mean(axis=1),
+        (powers_with / channel_powers)[:, counted].mean(axis=1),
     )
     drawn_stretches = draw_bootstrap_blocks(len(scaled_without))
     bootstrap_gains = 1 - scaled_with[drawn_stretches].sum(axis=1) / np.maximum(
@@ -58,6 +61,15 @@ def estimate_held_out_gain(
     )
     low, high = np.quantile(bootstrap_gains, [BOOTSTRAP_LEVEL, 1 - BOOTSTRAP_LEVEL])
     return HeldOutGain(float(1 - scaled_with.sum() / scaled_without.sum()), float(low), float(high))
+
+
+def _find_channels_above_noise(measure: ErrorMeasure, powers: FloatArray) -> Mask:
+    """Find (c,): channels with more than noise (`HELD_OUT_MISMATCH_ERROR`) in the held-out residuals; all where there
+    is none. powers: (c,), sums of squares as in `_compute_stretch_powers`. In a channel of noise alone, such as that of
+    another axis, no effect could explain anything."""
+    sample_count = sum(int(record.test.sum()) for record in measure.records)
+    is_above_noise = powers > sample_count * (HELD_OUT_MISMATCH_ERROR * measure.noise / measure.unit) ** 2
+    return is_above_noise if is_above_noise.any() else ~is_above_noise
 
 
 def predicts_motion(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:

@@ -24,15 +24,19 @@ from analysis.diagnosis.errors.hypothesis import (
 )
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import Effect, Parameter
 from equalizer.laws.law import Law
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import UnitSystem
 
 _AXIS_SIGNALS = re.compile(r"\b[qvf]\b")
 """Symbols of a formula for position (q), velocity (v) and command (f) of the law's axis."""
 _SIGNAL_PREFIX = {"q": "", "v": "v", "f": "f"}
 """Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance."""
+_EXTREME_MAGNITUDE = 1e30
+"""Limit of a parameter that is not in SI; its reciprocal is the least positive value. Beyond any unit of a device."""
 
 
 def write_law(formula: Formula, axis_letter: str) -> Law:
@@ -41,19 +45,45 @@ def write_law(formula: Formula, axis_letter: str) -> Law:
     return Law(law_text, formula.numbers, (), formula.acts_on, axis_letter)
 
 
-def can_be_simulated(driven_channel: int, judged_law: JudgedLaw) -> bool:
+def can_be_simulated(driven_channel: int, judged_law: JudgedLaw, units: UnitSystem | None = None) -> bool:
     """Whether a simulation can use the law: it has a formula, or is an effect of the catalogue that depends on the
     motion along its force and has values of all parameters within their bounds (included). driven_channel: index of the
-    channel of that motion."""
+    channel of that motion. units: of the model, None in SI."""
     if judged_law.formula is not None:
         return True
-    effect = EFFECTS.get(judged_law.law.effect)
+    effect = _select_effect(judged_law.law.effect, units)
     if effect is None or judged_law.law.channel != driven_channel:
         return False
     return all(
         parameter.name in judged_law.values and parameter.lower <= judged_law.values[parameter.name] <= parameter.upper
         for parameter in effect.parameters
     )
+
+
+def _select_effect(name: str, units: UnitSystem | None) -> Effect | None:
+    """Select an effect of the catalogue; None where it has none of that name. The bounds of its parameters are in SI.
+    With other units (a motion in counts, a command in A) they have no meaning for parameters in these units, which are
+    then limited by `_EXTREME_MAGNITUDE` alone."""
+    effect = EFFECTS.get(name)
+    if effect is None or units is None:
+        return effect
+    si_units = {parameter.name: parameter.unit for parameter in EFFECTS_BY_NAME[name].parameters}
+    return replace(
+        effect,
+        parameters=tuple(
+            parameter
+            if units.express(unit := si_units.get(parameter.name, "1")) == unit
+            else replace(parameter, lower=_widen_lower_bound(parameter), upper=_EXTREME_MAGNITUDE)
+            for parameter in effect.parameters
+        ),
+    )
+
+
+def _widen_lower_bound(parameter: Parameter) -> float:
+    """Widen the lower bound of a parameter that is not in SI; its sign, or zero, stays."""
+    if parameter.scale == "log":
+        return 1 / _EXTREME_MAGNITUDE
+    return -_EXTREME_MAGNITUDE if parameter.lower < 0 else parameter.lower
 
 
 def refit_laws(balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
@@ -110,9 +140,11 @@ def estimate_constant_forces(balances: Sequence[Balance]) -> Hypothesis:
     return hypothesis
 
 
-def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> Hypothesis:
+def make_hypothesis(
+    axis: int, judged_law: JudgedLaw, recording: Recording, units: UnitSystem | None = None
+) -> Hypothesis:
     """Convert a named law of the balance of an axis (index) to a hypothesis. recording: one with the channels that a
-    formula refers to."""
+    formula refers to. units: of the model, None in SI."""
     if judged_law.formula is not None:
         # Imported here to save start-up time: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import make_law_hypothesis
@@ -120,9 +152,10 @@ def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> H
 
         axis_letter = derive_axis_letters(recording.command.channels)[axis]
         return make_law_hypothesis(write_law(judged_law.formula, axis_letter), axis, recording)
-    parameters = EFFECTS_BY_NAME[judged_law.law.effect].parameters
+    effect, parameters = _select_effect(judged_law.law.effect, units), EFFECTS_BY_NAME[judged_law.law.effect].parameters
+    assert effect is not None
     return make_claim_hypothesis(
-        Claim(EFFECTS[judged_law.law.effect], "one", (axis,)),
+        Claim(effect, "one", (axis,)),
         [
             {
                 parameter.name: judged_law.values[parameter.name]

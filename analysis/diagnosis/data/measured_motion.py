@@ -14,6 +14,7 @@ from equalizer.effects.simulation.sensor_path import undo_low_pass
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import UnitSystem, determine_unit_system
 
 _FORCE_QUANTITIES = frozenset({"force", "torque"})
 """Quantities that count as forces: a recording with such a response was driven by an imposed motion."""
@@ -98,6 +99,12 @@ def is_free_motion(recording: Recording) -> bool:
 def select_time_unit(recording: Recording) -> str:
     """Select the unit of time: s, or "sample" where the time axis is unknown, so that rates are per sample."""
     return "s" if recording.is_timed else "sample"
+
+
+def find_unit_system(recording: Recording) -> UnitSystem | None:
+    """Find the units of a model that was fitted to the recording: those of its channels; None where they are SI."""
+    system = determine_unit_system(recording.command.units, recording.response.units, select_time_unit(recording))
+    return system if system.rotational is None else None
 
 
 def is_driven(recordings: Sequence[Recording]) -> bool:

@@ -234,9 +234,12 @@ def _list_rivals(context: SearchContext, catalogue_explanation: Explanation) -> 
 def _yield_candidates(
     context: SearchContext, discovery: Discovery, reasons: tuple[str, ...]
 ) -> Iterator[UnconfirmedEffect]:
-    """Yield each law as an unconfirmed candidate, with the gain of all laws together."""
+    """Yield each law as an unconfirmed candidate, with the gain of all laws together; of several laws, the last reason
+    states this."""
     gain = estimate_held_out_gain(context.full_measure, discovery.explanation.retuned, discovery.explanation.after)
     hypothesis = discovery.explanation.after.fitted.hypothesis
+    if (law_count := sum(law is not None for law in list_fitted_laws(hypothesis))) > 1:
+        reasons = (*reasons, f"this share is that of {law_count} laws together, which were found as one explanation")
     for law_index, law in enumerate(list_fitted_laws(hypothesis)):
         if law is not None:
             yield UnconfirmedEffect(

@@ -22,6 +22,7 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import POWER_BOUNDS
 from analysis.diagnosis.discovery.snap_exponents import converge_and_snap
 from analysis.diagnosis.effect_words import get_noun
+from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
 from analysis.diagnosis.limits import LAW_FACTOR_ERROR, LOUDER_RATIO, NOISE_ACCURACY, SAME_LAW_SHARE, SHUFFLED_RATIO
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import are_inseparable
@@ -252,7 +253,8 @@ def describe_held_out_test(
     held_out_kinds = conjoin(describe_held_out_kinds(measure.records))
     sentences = (
         f"The formula was tested on {held_out_kinds}, to which nothing was fitted: "
-        f"{_format_held_out_error(context, explanation, named_law)}"
+        f"there its error is {100 * _compute_held_out_error_share(context, explanation, named_law):.3g} % of the "
+        "re-tuned model's error"
     )
     least_rival_share = min(
         (_compute_held_out_error_share(context, explanation, rival) for rival in rivals), default=None
@@ -265,19 +267,17 @@ def describe_held_out_test(
     return f"{sentences}. Beyond {conjoin(ranges)} the formula is not tested." if ranges else f"{sentences}."
 
 
-def _format_held_out_error(context: SearchContext, explanation: Explanation, law: FittedCandidate) -> str:
-    """Format a clause with the law's held-out rms error in per cent of that of the re-tuned model."""
-    return (
-        f"there its error is {100 * _compute_held_out_error_share(context, explanation, law):.3g} % of the re-tuned "
-        "model's error"
-    )
-
-
 def _compute_held_out_error_share(context: SearchContext, explanation: Explanation, law: FittedCandidate) -> float:
-    """Compute the held-out rms error over the re-tuned model's, by the mean error power over the channels; NaN where
-    too little was held out."""
-    gain = estimate_held_out_gain(context.full_measure, explanation.retuned, law)
-    return float("nan") if gain is None else float(np.sqrt(max(1 - gain.gain, 0.0)))
+    """Compute the law's held-out error over that of the re-tuned model: rms errors relative to the signal, rms over the
+    channels, as the document's; NaN where nothing was held out."""
+    records = context.full_measure.records
+    masks = [record.test for record in records]
+    signal_rms = np.maximum(compute_signal_rms(records, masks) / context.full_measure.unit, np.finfo(float).tiny)
+    law_error, retuned_error = (
+        np.sqrt(np.mean((compute_residual_rms(records, fit.fitted.residuals, masks) / signal_rms) ** 2))
+        for fit in (law, explanation.retuned)
+    )
+    return float(law_error / retuned_error)
 
 
 def _format_ranges_of_motion(

@@ -29,7 +29,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
-from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
+from analysis.diagnosis.data.measured_motion import has_motion, is_free_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.limits import (
@@ -56,6 +56,10 @@ IN_SAMPLES = (
 IMPOSED = (
     "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
     "with the measured one."
+)
+FREE = (
+    "The motion is free, so the force per unit mass that the model needs along it is compared with the one that the "
+    "measured acceleration implies."
 )
 CLOSED_LOOP = (
     "The command depends on the response and the model's free motion does not decay within the recording, so a "
@@ -100,7 +104,7 @@ def select_error_measure(records: Sequence[Observed], model: MechanicalModel) ->
     if is_motion_measured and any(is_quasi_static(record.recording) for record in records):
         return RuleChoice("predicted force", UNTIMED)
     if any(record.recording.meta.get("imposed") for record in records):
-        return RuleChoice("predicted force", IMPOSED)
+        return RuleChoice("predicted force", FREE if is_free_motion(records[0].recording) else IMPOSED)
     if not has_decaying_motion and any(is_in_closed_loop(record.recording) for record in records):
         return (
             RuleChoice("predicted force", CLOSED_LOOP)

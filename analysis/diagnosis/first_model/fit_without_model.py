@@ -16,7 +16,7 @@ import numpy as np
 from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
-from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
+from analysis.diagnosis.data.measured_motion import fill_gaps, find_unit_system, is_free_motion, is_quasi_static
 from analysis.diagnosis.data.recorded_conditions import has_payload
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.model_from_balance import build_plain_model
@@ -53,7 +53,7 @@ UNTIMED_REMARK = (
 
 FREE_REMARK = (
     "No model was given. A damper per axis, and a spring where one can be fitted, were fitted first to the force per "
-    "unit mass that the free motion shows; the mass in the file is a lower bound."
+    "unit mass that the free motion shows; the mass in the file is 1, because a free motion does not determine it."
 )
 """Remarks of a diagnosis on its first model, by the method of the fit."""
 
@@ -139,7 +139,7 @@ def fit_first_linear_model(
         "parameters can represent, such as friction at one level as damping, is part of this model and is therefore "
         "not named."
     )
-    return widen_tolerance(fit.model), (
+    return replace(widen_tolerance(fit.model), units=find_unit_system(recordings[0])), (
         first_remark,
         *(format_sentence(remark) for remark in fit.remarks),
     )

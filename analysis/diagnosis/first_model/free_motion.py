@@ -21,6 +21,7 @@ from analysis.diagnosis.limits import DECAY_LEAST_CYCLES, DECAY_MOST_LEVELS
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL, determine_unit_system
 
 
 def is_undriven_motion(recordings: Sequence[Recording]) -> bool:
@@ -34,9 +35,9 @@ def is_undriven_motion(recordings: Sequence[Recording]) -> bool:
 
 
 def convert_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], str]:
-    """Replace the command of recordings of a free motion by the force per unit mass -q'' (N, for a mass of 1 kg, or N m
-    for 1 kg m^2), remove the excitation, and return a sentence about it. Recordings whose segments have neither roles
-    nor several amplitudes are divided into levels. Unchanged, with an empty sentence, without recordings or where
+    """Replace the command of recordings of a free motion by the force per unit mass -q'' (unit: `_choose_force_unit`),
+    remove the excitation, and return a sentence about it. Recordings whose segments have neither roles nor several
+    amplitudes are divided into levels. Unchanged, with an empty sentence, without recordings or where
     `is_undriven_motion` is False."""
     if not recordings or not is_undriven_motion(recordings):
         return tuple(recordings), ""
@@ -51,13 +52,12 @@ def convert_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recordin
         for start, stop in recording_parts
     ]
     band_hz = compute_band_end_hz(part_samples, rate_hz, order)
-    is_rotational = response.units[0].startswith("rad")
+    quantity, unit = _choose_force_unit(response)
     converted_recordings = []
     for recording, motion, recording_parts in zip(recordings, filled_samples, parts_by_recording, strict=True):
         force = np.zeros_like(motion)
         for start, stop in recording_parts:
             force[start:stop] = -differentiate(motion[start:stop], rate_hz, band_hz, 2 - order)
-        quantity, unit = ("torque", "N m") if is_rotational else ("force", "N")
         command = Signal(force, rate_hz, quantity, unit, response.channels)
         has_levels = (
             any(segment.role for segment in recording.segments)
@@ -66,11 +66,20 @@ def convert_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recordin
         segments = recording.segments if has_levels else _split_into_levels(recording, motion)
         meta = {**recording.meta, "imposed": FREE_MOTION}
         converted_recordings.append(replace(recording, command=command, excitation=None, segments=segments, meta=meta))
-    unit_mass = "inertia (1 kg m^2)" if is_rotational else "mass (1 kg)"
+    unit_mass = {LINEAR.force: "mass (1 kg)", ROTATIONAL.force: "inertia (1 kg m^2)"}.get(unit, f"mass, in {unit}")
     return tuple(converted_recordings), (
         "No command changes: the motion is free and determines forces only relative to the mass. All forces are per "
         f"unit {unit_mass}."
     )
+
+
+def _choose_force_unit(response: Signal) -> tuple[str, str]:
+    """Choose quantity and unit of the force per unit mass: a force for 1 kg, or a torque for 1 kg m^2, or, where the
+    position is neither in m nor in rad, an acceleration in its unit."""
+    length = determine_unit_system((LINEAR.force,), response.units).length
+    if length == ROTATIONAL.length:
+        return "torque", ROTATIONAL.force
+    return "force", LINEAR.force if length == LINEAR.length else f"{length}/s^2"
 
 
 def _split_into_levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:

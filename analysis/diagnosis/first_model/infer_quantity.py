@@ -4,7 +4,8 @@ From the channel's name where that is clear; force where the commands are motion
 response y and its derivatives, f = m y'' + c y' + k y. With a position, mass makes y'' significant; with a velocity,
 mass multiplies y' and damping y, so that y'' is not needed. A response is a velocity where y'' explains less than
 `DERIVATIVE_GAIN` of the force's power in cross-validation and y at least that much, otherwise a position. A sensor's
-voltage is treated likewise. Without a command that changes, a response without a unit is taken for a position.
+voltage is treated likewise. Without a command that changes, a response without a unit is taken for a position. Where
+forces were measured, a command without a unit is the imposed motion that its name states.
 """
 
 from collections.abc import Sequence
@@ -20,22 +21,28 @@ from analysis.diagnosis.limits import DERIVATIVE_GAIN
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
 from equalizer.signals.units import NO_UNIT
 
-BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
+FORCE_QUANTITIES = frozenset({"force", "torque"})
+"""Quantities of a measured force."""
+BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | FORCE_QUANTITIES) - {"voltage"}
 """Quantities that a force balance can use. A voltage is a sensor's reading of an unknown quantity."""
 
 
 def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """Infer the quantity of the responses. Returns the recordings with it, and a sentence on the assumption. Unchanged,
-    with an empty sentence: where the quantity of any response is stated; with a unit, where no name tells a quantity
-    and no command changes; for a voltage that behaves like a position. recordings: alike in channels, units, rate."""
+    """Infer the quantity of the responses, or of commands (`_infer_imposed_motion`). Returns the recordings with it,
+    and a sentence on the assumption. Unchanged, with an empty sentence: where the quantity of any response is stated;
+    with a unit, where no name tells a quantity and no command changes; for a voltage that behaves like a position.
+    recordings: alike in channels, units, rate."""
     first_recording = recordings[0]
+    if set(first_recording.response.quantities) <= FORCE_QUANTITIES:
+        return _infer_imposed_motion(recordings)
     if set(first_recording.response.quantities) & BALANCE_QUANTITIES:
         return recordings, ""
-    if quantities_in_names := _infer_from_names(first_recording):
+    if quantities_in_names := _infer_from_names(first_recording.response, BALANCE_QUANTITIES):
         return tuple(_set_quantity(recording, quantities_in_names) for recording in recordings), _format_names_sentence(
-            first_recording, quantities_in_names
+            first_recording.response, quantities_in_names
         )
     if not is_driven(recordings):
         if set(first_recording.response.units) != {NO_UNIT}:
@@ -55,25 +62,35 @@ def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     )
 
 
-def _infer_from_names(recording: Recording) -> tuple[str, ...]:
-    """Infer the quantities of the responses without a unit from their names; empty where no name determines one."""
+def _infer_imposed_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+    """Infer, where all responses are forces, the motion that commands without a unit (encoder counts) impose, from
+    their names. Unchanged, with an empty sentence, where no name of such a command states a motion."""
+    command = recordings[0].command
+    quantities = _infer_from_names(command, BALANCE_QUANTITIES - FORCE_QUANTITIES)
+    if not quantities or quantities == command.quantities:
+        return recordings, ""
+    return tuple(
+        replace(recording, command=replace(recording.command, quantity=quantities)) for recording in recordings
+    ), _format_names_sentence(command, quantities)
+
+
+def _infer_from_names(signal: Signal, allowed: frozenset[str]) -> tuple[str, ...]:
+    """Infer the quantities of the channels without a unit from their names; empty where no channel has one of the
+    allowed quantities then."""
     from equalizer.signals.quantity_words import detect_quantity  # only where a quantity is missing
 
-    response = recording.response
     quantities = [
-        inferred_quantity
-        if unit == NO_UNIT and (inferred_quantity := detect_quantity(name)) in BALANCE_QUANTITIES
-        else quantity
-        for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
+        inferred_quantity if unit == NO_UNIT and (inferred_quantity := detect_quantity(name)) in allowed else quantity
+        for name, unit, quantity in zip(signal.channels, signal.units, signal.quantities, strict=True)
     ]
-    return tuple(quantities) if set(quantities) & BALANCE_QUANTITIES else ()
+    return tuple(quantities) if set(quantities) & allowed else ()
 
 
-def _format_names_sentence(recording: Recording, quantities: Sequence[str]) -> str:
+def _format_names_sentence(signal: Signal, quantities: Sequence[str]) -> str:
     """Format a sentence on the quantities that were taken from names, with the way to correct them."""
     phrases = [
         f"{name} was taken for {'an' if quantity.startswith('a') else 'a'} {quantity}"
-        for name, quantity in zip(recording.response.channels, quantities, strict=True)
+        for name, quantity in zip(signal.channels, quantities, strict=True)
         if quantity in BALANCE_QUANTITIES
     ]
     return f"From the name alone, {conjoin(phrases)}; if it is another quantity, state that in the map (quantity)."

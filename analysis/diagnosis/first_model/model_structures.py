@@ -14,7 +14,7 @@ import numpy as np
 from analysis.diagnosis.balance.laws.law import measure_scales
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.data.measured_motion import is_free_motion, select_time_unit
+from analysis.diagnosis.data.measured_motion import find_unit_system, is_free_motion
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, build_regressions, fit_jointly
 from analysis.diagnosis.limits import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
@@ -24,7 +24,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import Mechanical
 from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 from equalizer.plant.effect_vocabulary import find_matrix_unit
 from equalizer.plant.linear_simulation import compute_driven_axes
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance, adopt_recording_units
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import UnitSystem
 
@@ -40,8 +40,8 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
 }
 """Matrices that the force balance fits, by structure; fewer without a time axis or for a free motion."""
 FIXED_SHARE = 1e-6
-"""Chosen so that re-tuning hardly changes a mass: without a time axis, factor on the least mass, and standard deviation
-stated for mass and damping (in their units); for a free motion, that of the mass over the largest mass."""
+"""Chosen so that re-tuning hardly changes a mass: factor on the least mass without a time axis; standard deviation of
+the mass over the largest mass, and, without a time axis, of the damping over the largest stiffness times a sample."""
 NAME_TEMPLATE = "first model, {}"
 """Name of the fitted model, to be filled in with its structure."""
 MEASURED_FORCE, SIMULATED_MOTION = "force along the measured motion", "free simulation"
@@ -168,7 +168,7 @@ def fit_modal_structure(
     remarks = tuple(format_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
     first = recordings[0]
-    model = adopt_recording_units(widen_tolerance(fit.model), first.command.units, first.response.units)
+    model = replace(widen_tolerance(fit.model), units=find_unit_system(first))
     return StructureFit(
         kind,
         model,
@@ -239,9 +239,9 @@ def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> Mec
     widened = widened_model.tolerance
     tolerance = Tolerance(widened.mass_kg, widened.damping_n_s_per_m or None, widened.stiffness_n_per_m or None, None)
     if balanced.untimed:
-        tolerance = Tolerance(FIXED_SHARE, FIXED_SHARE, widened.stiffness_n_per_m, None)
-    units = recording.command.units, recording.response.units
-    return adopt_recording_units(replace(widened_model, tolerance=tolerance), *units, select_time_unit(recording))
+        fixed_mass, fixed_damping = (FIXED_SHARE * float(np.abs(matrix).max()) for matrix in (mass, stiffness))
+        tolerance = Tolerance(fixed_mass, fixed_damping, widened.stiffness_n_per_m, None)
+    return replace(widened_model, tolerance=tolerance, units=find_unit_system(recording))
 
 
 def _find_least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

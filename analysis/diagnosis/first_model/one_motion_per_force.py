@@ -15,7 +15,7 @@ from analysis.diagnosis.balance.laws.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.free_motion import convert_free_motion
-from analysis.diagnosis.first_model.infer_quantity import infer_quantities
+from analysis.diagnosis.first_model.infer_quantity import FORCE_QUANTITIES, infer_quantities
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
 from analysis.diagnosis.limits import SINGULAR_VALUE_RATIO
@@ -24,8 +24,6 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
-FORCE_QUANTITIES = frozenset({"force", "torque"})
-"""Quantities of a measured force."""
 DRIVE_QUANTITIES = FORCE_QUANTITIES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
 """Quantities of commands that drive a motion; all other commands, such as a temperature, are conditions."""
 CONSTANT_RANGE = 1e-9

@@ -70,7 +70,10 @@ def build_predicted_force_measure(
         force_record = _build_force_record(record, force, band_hz)
         force_records.append(force_record)
         force_floors.append(_compute_force_noise(model, motion, floor, band_hz))
-    forces = np.vstack([force_record.measured for force_record in force_records])
+    # The samples that are compared, or all where none is: the filter distorts the force at the ends.
+    used_forces = [record.measured[record.fit | record.choose | record.test] for record in force_records]
+    has_role = any(len(used_force) for used_force in used_forces)
+    forces = np.vstack(used_forces if has_role else [record.measured for record in force_records])
     # An unsuitable model overestimates the noise, so it is limited to the strongest force's standard deviation, because
     # that of an idle axis may be below the noise.
     noise = np.minimum(np.fmin.reduce([floor.response_rms for floor in force_floors]), np.std(forces, axis=0).max())

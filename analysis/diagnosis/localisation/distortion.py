@@ -99,15 +99,34 @@ class Distortions:
     """Sentences for the user."""
 
 
-def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
+def find_distortions(recordings: Sequence[Recording], floors: Sequence[NoiseFloor]) -> Distortions:
     """Find the distortion of each channel of response and position, per input, level and band (the whole driven band
     and each octave of it).
 
-    floor: the recording's noise; where it is not known, or nothing is periodic, no cell is evaluated and a remark says
+    floors: noise of each recording; where none is known, or nothing is periodic, no cell is evaluated and a remark says
     so.
     """
-    if not floor.is_known:
+    known = [(recording, floor) for recording, floor in zip(recordings, floors, strict=True) if floor.is_known]
+    if not known:
         return Distortions((), ("The noise is not known, so distortion cannot be distinguished from it.",))
+    evaluated_periods: list[tuple[Periods, DetectionLines]] = []
+    cells: list[Distortion] = []
+    for recording, floor in known:
+        recording_periods = _find_evaluated_periods(recording)
+        evaluated_periods += recording_periods
+        signals = [(recording.response, floor.response)] if recording_periods else []
+        if signals and recording.position is not None and floor.position is not None:
+            signals.append((recording.position, floor.position))
+        for signal, noise in signals:
+            for spectrum in compute_segment_spectra(recording, signal, noise, floor.frequency_hz, recording_periods):
+                cells += _compute_cells(spectrum, signal)
+    if not evaluated_periods:
+        return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be distinguished.",))
+    return Distortions(tuple(cells), tuple(_list_untestable_remarks(evaluated_periods)))
+
+
+def _find_evaluated_periods(recording: Recording) -> list[tuple[Periods, DetectionLines]]:
+    """Find the repeated periods of a recording's segments, with their driven and silent lines."""
     settled_periods = find_settled_periods(recording)
     excitation = select_instrument_signal(recording)
     hold_samples = compute_hold_samples(excitation)
@@ -115,19 +134,9 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
         find_detection_lines(compute_period_spectra(excitation, period).mean(axis=0), hold_samples)
         for period in settled_periods
     ]
-    evaluated_periods = [
+    return [
         (period, lines) for period, lines in zip(settled_periods, detection_lines, strict=True) if lines is not None
     ]
-    if not evaluated_periods:
-        return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be distinguished.",))
-    signals = [(recording.response, floor.response)]
-    if recording.position is not None and floor.position is not None:
-        signals.append((recording.position, floor.position))
-    cells: list[Distortion] = []
-    for signal, noise in signals:
-        for spectrum in compute_segment_spectra(recording, signal, noise, floor.frequency_hz, evaluated_periods):
-            cells += _compute_cells(spectrum, signal)
-    return Distortions(tuple(cells), tuple(_list_untestable_remarks(evaluated_periods)))
 
 
 def _list_untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:

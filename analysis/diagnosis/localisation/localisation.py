@@ -43,7 +43,7 @@ class Localisation:
     entry: EntryPoint | None = None
     """Entry point of the re-tuned model's residual; None as `find_entry_point`."""
     distortions: Distortions = field(default_factory=lambda: Distortions((), ()))
-    """Distortion of the first recording (`find_distortions`)."""
+    """Distortion of all recordings (`find_distortions`)."""
 
 
 def find_entry_point(

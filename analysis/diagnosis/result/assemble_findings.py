@@ -55,7 +55,7 @@ def assemble_findings(
     channels, errors = list_channel_names(recording, len(measure.noise)), _compute_standard_errors(result)
     maps = build_mismatch_maps(measure, fits.stages, floors, learned, context.map_)
     time_series = _build_time_series(measure, fits, names)
-    examination = examine_fits(result, floors[0], maps)
+    examination = examine_fits(result, floors, maps)
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
     measure_remarks = (_describe_held_out_rest(measure), describe_model_error_floor(learned, channels), in_samples)

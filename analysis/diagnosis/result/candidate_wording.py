@@ -7,7 +7,7 @@ a family of `_LAW_FAMILIES`, its name is stated, too.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect
+from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect, format_law
 from analysis.diagnosis.effect_words import (
     SIMULATED_AS_FORMULA,
     format_parameters,
@@ -15,7 +15,7 @@ from analysis.diagnosis.effect_words import (
     get_noun,
     get_parameter_unit,
 )
-from analysis.diagnosis.unit_wording import format_share
+from analysis.diagnosis.unit_wording import format_share, typeset_unit
 from analysis.wording import capitalise, end_sentence
 from equalizer.signals.unit_system import UnitSystem
 
@@ -131,15 +131,17 @@ def _find_family(names: Sequence[str]) -> tuple[str, str] | None:
 
 
 def format_candidate(candidate: Candidate, device: DeviceWording | None = None) -> str:
-    """Format a candidate: effect, place and, if there are any, parameters."""
+    """Format a candidate: effect, place and, if there are any, parameters or its formula."""
     place_text = format_place(candidate.place, candidate.axis, device is not None and device.is_single_axis)
     values_text = format_candidate_parameters(candidate, device)
     return f"{get_noun(candidate.effect)} {place_text}{f', {values_text}' if values_text else ''}"
 
 
 def format_candidate_parameters(candidate: Candidate, device: DeviceWording | None = None) -> str:
-    """Format the parameters of a candidate with units; empty without parameters. device: None = not known; the numbers
-    are then in SI, without units, and with exponents such as e-5 instead of e-05."""
+    """Format the parameters of a candidate with units, or its formula; empty without parameters. device: None = not
+    known; the numbers are then in SI, without units, and with exponents such as e-5 instead of e-05."""
+    if candidate.law is not None:
+        return format_law(candidate.law, "" if device is None else typeset_unit(device.system.force))
     if device is None:
         text = ", ".join(
             f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()

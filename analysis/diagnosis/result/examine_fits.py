@@ -5,6 +5,7 @@ and the distortion are computed in parallel. A part that crashes is left out wit
 (`search.guard`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -49,13 +50,13 @@ class Examination:
     data is known, or its fit crashed."""
 
 
-def examine_fits(search_result: SearchResult, noise_floor: NoiseFloor, maps: MismatchMaps) -> Examination:
+def examine_fits(search_result: SearchResult, floors: Sequence[NoiseFloor], maps: MismatchMaps) -> Examination:
     """Localise the mismatch of the given, the re-tuned and the final model, and compute the curves of the named
-    effects. noise_floor: of the first record. maps: mismatch maps of these three stages."""
+    effects. floors: noise of each record. maps: mismatch maps of these three stages."""
     context, explanation = search_result.context, search_result.found
     measure, tuning, stages = context.full_measure, context.tuning, explanation.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
-    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], noise_floor, maps.cells["retuned"])
+    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floors[0], maps.cells["retuned"])
     entry_point = context.guard.run(LOCALISATION_NAME, "its work", entry_search, None)
     # Stages with the same fit are examined once.
     stage_by_fit = {id(fitted): stage for stage, fitted in stages.items()}
@@ -73,7 +74,7 @@ def examine_fits(search_result: SearchResult, noise_floor: NoiseFloor, maps: Mis
         WorkPart(
             LOCALISATION_NAME,
             "its work",
-            partial(find_distortions, measure.records[0].recording, noise_floor),
+            partial(find_distortions, [record.recording for record in measure.records], floors),
             Distortions((), ()),
         ),
     ]

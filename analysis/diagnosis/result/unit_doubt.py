@@ -73,22 +73,22 @@ def _name_likely_error(factor: float) -> str:
 
 
 def describe_unknown_units(model: MechanicalModel) -> str:
-    """Describe, in a sentence, the unit of forces, masses, damping and stiffness where commands have no known
-    conversion to force or torque; empty for a known unit system."""
+    """Describe, in a sentence, the unit of forces, masses, damping and stiffness where the signal of the force (the
+    command, or the response to an imposed motion) is no force or torque; empty for a known unit system."""
     system = model.system
     if system.has_force_unit:
         return ""
-    command_unit_text = "has no unit" if system.force == "1" else f"is in {system.force}"
+    force_unit_text = "have no unit" if system.force == "1" else f"are in {system.force}"
     force_name_and_unit = {"m": ("force", "N"), "rad": ("torque", "N m")}.get(system.length)
     if force_name_and_unit is None:
         motion_unit_text = "has no unit" if system.length == "1" else f"is in {system.length}"
         return (
-            f"The command {command_unit_text}, and the motion {motion_unit_text}: forces, masses and stiffnesses are "
-            "given in these units and not in N or kg."
+            f"Forces {force_unit_text}, as their signal, and the motion {motion_unit_text}: forces, masses and "
+            "stiffnesses are given in these units and not in N or kg."
         )
+    name, unit = force_name_and_unit
     divisor_text = "" if system.force == "1" else f" per {system.force}"
     return (
-        f"The command {command_unit_text}, and the {force_name_and_unit[0]} that it produces is not known: every "
-        f"{force_name_and_unit[0]}, mass, damping and stiffness must be multiplied by the {force_name_and_unit[0]} "
-        f"constant ({force_name_and_unit[1]}{divisor_text}); state it with --force-constant."
+        f"The {name}s {force_unit_text}, as their signal: every {name}, mass, damping and stiffness must be multiplied "
+        f"by the {name} constant ({unit}{divisor_text}), which is not known; state it with --force-constant."
     )

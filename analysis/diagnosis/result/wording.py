@@ -4,7 +4,7 @@
 to the signal or, in a force balance, to the force.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect, format_law
 from analysis.diagnosis.effect_words import WHOLE_DEVICE_FAULTS, format_parameters, format_place, get_noun
@@ -39,6 +39,8 @@ from analysis.diagnosis.result.retuned_parameters import (
 )
 from analysis.diagnosis.unit_wording import format_probability, format_share, typeset_unit
 from analysis.wording import capitalise, conjoin, end_sentence, format_p_text
+from equalizer.effects.discovered_law import set_law_values
+from equalizer.effects.effect import PlacedEffect
 
 _MAX_LISTED_PLACES = 3
 """Largest number of rows of a remaining mismatch that a sentence lists. Chosen."""
@@ -235,10 +237,9 @@ def write_summary_lines(findings: Findings) -> tuple[str, ...]:
     diagnosis, device = findings.diagnosis, extract_device(findings)
     moved_parameters = find_final_moves(findings)
     lines = [write_answer(findings)]
-    signatures = collect_signature_texts(findings)
     for effect in diagnosis.effects:
         lines += [
-            describe_effect(effect, signatures.get(effect.effect, ""), device),
+            describe_effect(effect, get_signature_text(findings, effect), device),
             describe_equivalents(effect),
         ]
     if diagnosis.verdict in ("explained", "partly_explained"):
@@ -269,6 +270,20 @@ def find_final_moves(findings: Findings) -> tuple[MovedParameter, ...]:
     return find_moved_parameters(findings.tuning, findings.explanation.after.fitted.deviations)
 
 
-def collect_signature_texts(findings: Findings) -> Mapping[str, str]:
-    """Collect the catalogue's texts on what each named effect causes in the data, by name of the effect."""
-    return {placed_effect.effect.name: placed_effect.effect.signature for placed_effect in findings.named}
+def find_fitted_effect(findings: Findings, effect: NamedEffect) -> PlacedEffect | None:
+    """Find the fit of a named effect, a discovered law by its formula; None where the findings have no such fit."""
+    for placed_effect in findings.named:
+        law = placed_effect.effect.law
+        is_same_law = (
+            effect.law is None or law is None
+            or set_law_values(law, placed_effect.values).text == effect.law.expression
+        )  # fmt: skip
+        if placed_effect.effect.name == effect.effect and is_same_law:
+            return placed_effect
+    return None
+
+
+def get_signature_text(findings: Findings, effect: NamedEffect) -> str:
+    """Return the catalogue's text on what a named effect causes in the data; empty where it has no fit."""
+    placed_effect = find_fitted_effect(findings, effect)
+    return "" if placed_effect is None else placed_effect.effect.signature

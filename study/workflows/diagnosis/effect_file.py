@@ -66,7 +66,7 @@ def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
             "Choose a name of small letters, digits and _ that is not in the catalogue, such as my_effect.py.",
         )
     law = laws[number - 1]
-    signature = f"it varies with {', '.join(law.variables) or 'nothing'} as the formula states"
+    signature = "it varies as the formula states"  # without the signals: at another axis these have other names
     docstring_text = f"Discovered law without a name: {law.text} (acts on the {law.acts_on} at {law.axis})."
     entry = LawEntry(out_path.stem, law, f"found by hapteq: {source.name}", signature)
     write_text(

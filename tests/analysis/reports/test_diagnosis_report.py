@@ -4,10 +4,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from analysis.diagnosis.document import Candidate, Errors, Estimate, Fit, Mismatch, Rival
+from analysis.diagnosis.document import Candidate, Errors, Estimate, Fit, Mismatch, Rival, make_found_law
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.result.plausibility import describe_doubts
-from analysis.diagnosis.result.wording import find_final_moves, write_summary_lines
+from analysis.diagnosis.result.wording import find_final_moves, get_signature_text, write_summary_lines
 from analysis.reports.diagnosis_method import write_method_paragraphs
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.diagnosis_tables import (
@@ -17,7 +17,9 @@ from analysis.reports.diagnosis_tables import (
     tabulate_retuned,
     tabulate_rivals,
 )
+from equalizer.effects.discovered_law import Channels, make_law_effect
 from equalizer.effects.effect import PlacedEffect
+from equalizer.laws.law import parse_law
 
 PLACE = Mismatch("ax", "fx", (8.0, 16.0), 0.5, None, 0.8, 1e-9)
 
@@ -235,3 +237,25 @@ def test_an_improved_model_that_makes_energy_is_doubted(friction_findings):
     model = replace(friction_findings.improved, damping=np.array([[-1.0]]))
     (said,) = describe_doubts(replace(friction_findings, improved=model))
     assert said == "The improved model's damping is negative in one direction: in it, the device would generate energy."
+
+
+def test_the_equation_of_a_law_has_the_fitted_numbers(friction_findings):
+    """The effect of a law keeps the numbers from which its fit started."""
+    (effect,), law = friction_findings.diagnosis.effects, parse_law("-0.2*tanh(vx/0.01)", "force", "x")
+    fitted = PlacedEffect(make_law_effect(law, Channels(("fx",), ("ax",))), (0,), {"p0": 0.25, "p1": 0.02})
+    found_law = make_found_law(law.replace_numbers([0.25, 0.02]))
+    named = replace(effect, effect="discovered_law", parameters={}, law=found_law, rivals=())
+    text, _ = render(replace(change_diagnosis(friction_findings, effects=(named,)), named=(fitted,), signatures=()))
+    assert "Equation: F = -0.25*tanh(vx/0.02) N." in text
+    assert "-0.2*tanh" not in text
+
+
+def test_two_laws_are_each_described_by_their_own_signals(friction_findings):
+    """The two forces of an antisymmetric pair, fitted from other numbers."""
+    (effect,), laws = friction_findings.diagnosis.effects, [parse_law(f"3.0*v{x}", "force", "x") for x in "yx"]
+    fits = tuple(PlacedEffect(make_law_effect(law), (site,), {"p0": 2.5}) for site, law in enumerate(laws))
+    findings = replace(friction_findings, named=fits)
+    for law, signal in zip(laws, ("vy", "vx"), strict=True):
+        named = replace(effect, effect="discovered_law", law=make_found_law(law.replace_numbers([2.5])))
+        assert get_signature_text(findings, named) == f"it depends on {signal} as the formula states"
+    assert get_signature_text(findings, effect) == ""

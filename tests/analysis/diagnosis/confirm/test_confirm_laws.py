@@ -25,6 +25,7 @@ from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.instant import LENGTH, X_FREE, X
+from equalizer.signals.unit_system import UnitSystem
 
 OPEN, SURE = 1.01 / INTERVAL_HALF_WIDTH, 0.1 / INTERVAL_HALF_WIDTH
 """Standard errors of a logarithm whose interval holds zero, and of one that is well known."""
@@ -152,7 +153,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
     regression = SimpleNamespace(base_terms=SimpleNamespace(driven_channel=0))
     balance = SimpleNamespace(named=(law,), search=SimpleNamespace(regression=regression))
     patched = {
-        "can_be_simulated": lambda own, weighed: True,
+        "can_be_simulated": lambda own, weighed, units: True,
         "estimate_constant_forces": lambda balances: SimpleNamespace(claims=()),
         "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
         "compute_final_errors": lambda *of: np.zeros(1), "_find_undetermined_law": lambda *of: None,
@@ -165,7 +166,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
     context = SimpleNamespace(
         measure=None,
         full_measure=None,
-        tuning=SimpleNamespace(names=()),
+        tuning=SimpleNamespace(names=(), model=SimpleNamespace(units=None)),
         score_fit=candidate_with_test_error,
         with_test_score=lambda each: each,
     )
@@ -260,3 +261,23 @@ def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, 
     assert placed.effect.action.law(numbers, np.zeros(1), at) == pytest.approx(-800.0 * (pushing_at_m - position_m))
     at[X] = at[X_FREE] = position_m - 0.01 * side
     assert placed.effect.action.law(numbers, np.zeros(1), at) == 0
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [("presliding_hysteresis", {"level": 0.07, "stiffness": 4e-4}),
+     ("end_stop", {"position": 18000.0, "stiffness": 2e-9, "opposite": 0.0}),
+     ("stribeck_friction", {"coulomb": 0.1, "static": 0.2, "speed": 4e4})],
+)  # fmt: skip
+def test_bounds_in_si_do_not_limit_a_law_of_a_motion_in_counts(effect, values):
+    judged, counts = (
+        SimpleNamespace(formula=None, law=SimpleNamespace(effect=effect, channel=0), values=values),
+        UnitSystem("A", "1"),
+    )
+    assert not can_be_simulated(0, judged)
+    assert can_be_simulated(0, judged, counts)
+    hypothesis = make_hypothesis(0, judged, None, counts)
+    (placed,) = hypothesis.list_placed_effects()
+    assert {name: placed.values[name] for name in values} == pytest.approx(values)
+    opposite = [each.bounds for each in hypothesis.parameters if each.parameter.name == "opposite"]
+    assert all(bounds[0] == 0 for bounds in opposite)  # a plain number keeps its bounds

@@ -79,13 +79,24 @@ def make_candidate(residuals, name="coulomb_friction", deviations=(0.0,)):
     return SimpleNamespace(fitted=fitted, newest=name)
 
 
-MEASURE = SimpleNamespace(records=(SimpleNamespace(test=np.ones(1600, dtype=bool)),))
+MEASURE = SimpleNamespace(
+    records=(SimpleNamespace(test=np.ones(1600, dtype=bool)),), unit=np.array([1.0, 1.0]), noise=np.full(2, 0.1)
+)
 NOISE = np.random.default_rng(5).normal(size=(1600, 2))
 
 
 def test_a_gain_is_the_share_of_the_error_power_that_goes():
     found = estimate_held_out_gain(MEASURE, make_candidate(NOISE), make_candidate(0.5 * NOISE))
     assert (found.gain, found.low, found.high) == pytest.approx((0.75, 0.75, 0.75))
+
+
+def test_a_channel_of_noise_alone_does_not_lower_the_gain():
+    """An effect on one axis, in a device whose other axes are predicted down to their noise."""
+    without, with_effect = (np.column_stack([scale * NOISE[:, 0], 0.1 * NOISE[:, 1]]) for scale in (1.0, 0.5))
+    found = estimate_held_out_gain(MEASURE, make_candidate(without), make_candidate(with_effect))
+    assert (found.gain, found.low, found.high) == pytest.approx((0.75, 0.75, 0.75))
+    worse = np.column_stack([0.5 * NOISE[:, 0], NOISE[:, 1]])
+    assert estimate_held_out_gain(MEASURE, make_candidate(without), make_candidate(worse)).gain < -40
 
 
 def test_a_random_difference_has_a_gain_interval_around_zero():

@@ -1,9 +1,12 @@
 """Whether what was held out differs in kind from what a law was fitted to, by the split that recordings get."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.discovery.validation import describe_held_out_kinds
+from analysis.diagnosis.discovery.validation import _compute_held_out_error_share, describe_held_out_kinds
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
@@ -42,3 +45,22 @@ def test_louder_joint_and_other_commands_are_reported():
 
 def test_without_anything_to_fit_nothing_is_reported():
     assert describe_held_out(("sweep", 1.0, (0,), "test")) == ()
+
+
+def test_the_error_of_a_law_is_said_as_in_the_verdict():
+    """As a share of the signal over all channels, of which one is predicted down to its noise without the law."""
+    random = np.random.default_rng(3)
+    position, retuned = random.normal(size=(SAMPLES, 2)), random.normal(size=(SAMPLES, 2)) * (0.2, 0.001)
+    recording = Recording(
+        "rig",
+        Signal(position, 1000.0, "force", "N", ("fx", "fy")),
+        Signal(position, 1000.0, "speed", "m/s", ("x", "y")),
+    )
+    record = SimpleNamespace(test=np.ones(SAMPLES, dtype=bool), measured=position, recording=recording)
+    measure = SimpleNamespace(records=(record,), unit=np.ones(2), noise=np.full(2, 0.001))
+    law, model = (
+        SimpleNamespace(fitted=SimpleNamespace(residuals=(residuals,)), score=None)
+        for residuals in (retuned * (0.01, 1.0), retuned)
+    )
+    share = _compute_held_out_error_share(SimpleNamespace(full_measure=measure), SimpleNamespace(retuned=model), law)
+    assert share == pytest.approx(np.hypot(0.002, 0.001) / 0.2, rel=0.1)

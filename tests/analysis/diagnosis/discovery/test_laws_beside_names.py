@@ -1,11 +1,12 @@
 """Names that may only approximate a law that the catalogue lacks, and the shorter law in their place. Compiles."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from analysis.diagnosis.discovery.add_laws import LawSearch, check_laws, may_approximate_law
+from analysis.diagnosis.discovery.add_laws import LawSearch, _yield_candidates, check_laws, may_approximate_law
 from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.discovery.discover import discover_laws
 from analysis.diagnosis.discovery.validation import is_shorter_and_as_good
@@ -15,6 +16,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.search.verdict import SearchResult, judge
 from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.discovered_law import get_law_values, make_law_effect
 from tests.lawful import arena_of, law, recorded
 
 CUBIC = 4e4
@@ -140,3 +142,18 @@ def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardening_conte
     assert cut
     assert any(not each.rounds[-1].complete for each in cut)
     assert all(each.explanation.after.fitted.cost < known.retuned.fitted.cost for each in cut)
+
+
+def test_each_of_several_unconfirmed_laws_states_that_its_share_is_that_of_all(monkeypatch):
+    monkeypatch.setattr("analysis.diagnosis.discovery.add_laws.estimate_held_out_gain", lambda *arguments: None)
+    claims = [
+        make_claim_hypothesis(Claim(make_law_effect(each), "one", (0,)), [get_law_values(each)])
+        for each in (law("p0*x**3", 0.1), law("p0", 0.1))
+    ]
+    for hypothesis, is_stated in ((claims[0], False), (combine_hypotheses(*claims), True)):
+        after = SimpleNamespace(fitted=SimpleNamespace(hypothesis=hypothesis))
+        discovery = SimpleNamespace(explanation=SimpleNamespace(retuned=None, after=after))
+        found = list(_yield_candidates(SimpleNamespace(full_measure=None), discovery, ("too weak",)))
+        assert len(found) == len(hypothesis.claims)
+        assert all(each.why_not.startswith("too weak") for each in found)
+        assert all(("that of 2 laws together" in each.why_not) == is_stated for each in found)

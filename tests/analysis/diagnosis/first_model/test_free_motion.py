@@ -86,6 +86,24 @@ def test_dry_friction_is_named_from_a_decay(seed):
     (friction,) = found.diagnosis.effects
     assert "coulomb_friction" in effect_names(found)
     assert friction.parameters["level"].value == pytest.approx(0.8, rel=0.25)
+    assert any("The motion is free" in remark for remark in found.remarks)
+    assert not any("was imposed" in remark or "lower bound" in remark for remark in found.remarks)
+    assert found.improved.mass == pytest.approx(np.eye(1))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "force_unit"),
+    [("position", "m", "N"), ("angle", "rad", "N m"), ("velocity", "m/s", "N"), ("voltage", "V", "V/s^2"),
+     ("position", "1", "1/s^2")],
+)  # fmt: skip
+def test_forces_per_unit_mass_are_in_the_unit_of_the_motion(quantity, unit, force_unit):
+    decay = make_recording(simulate_decay(linear_acceleration, 1.0, 8, 3))
+    read = replace(decay, response=replace(decay.response, quantity=quantity, unit=unit))
+    (converted,), sentence = convert_free_motion([read])
+    assert converted.command.units == (force_unit,)
+    assert f"per unit mass, in {force_unit}." in sentence or force_unit in ("N", "N m")
+    chosen = choose_structure([converted], None, lambda share: None)
+    assert all(("N" in parameter.unit) == ("N" in force_unit) for parameter in chosen.fit.parameters)
 
 
 @pytest.mark.slow

@@ -49,3 +49,11 @@ def test_what_a_name_says_of_several_is_said_of_each_and_the_others_stay_open():
 @pytest.mark.parametrize(("quantity", "unit"), [("velocity", "m/s"), ("position", "m")])
 def test_a_stated_quantity_counts_more_than_the_name(quantity, unit):
     assert named_quantities(("angle", quantity, unit, PLACE)) == ((quantity,), "")
+
+
+@pytest.mark.parametrize(("name", "quantity"), [("displacement", "position"), ("encoder", "position"), ("u", "1")])
+def test_a_command_in_counts_is_the_imposed_motion_that_its_name_says_where_forces_were_measured(name, quantity):
+    (found,), said = infer_quantities((make_recording([(name, *PLAIN, PLACE)], [("load", "force", "N", PUSH)]),))
+    assert found.command.quantities == (quantity,)
+    assert found.response.quantities == ("force",)
+    assert said.startswith(f"From the name alone, {name} was taken for a position") == (quantity == "position")

@@ -158,3 +158,18 @@ def test_the_noise_of_an_idle_axis_is_not_capped_by_its_own_force() -> None:
     inside = slice(500, -500)
     assert np.std(left[inside, 1]) < 3
     assert measure.noise.max() <= np.std(command, axis=0).max()
+
+
+def test_the_noise_is_capped_by_the_force_that_is_compared_and_not_by_that_at_the_ends() -> None:
+    """With a model that is far too heavy all is noise, and a shock at the start, which no error counts, is none of it;
+    with a larger cap, any model would agree with the device."""
+    rng = np.random.default_rng(7)
+    command = 3 * np.sin(2 * np.pi * 1.1 * TIME_S)[:, None]
+    moved = simulate_mechanism(make_body(), command, RATE_HZ).response + 1e-4 * rng.standard_normal((4000, 1))
+    shocked = command + np.where(np.arange(4000) < 20, 2000.0, 0.0)[:, None]
+    signals = (Signal(shocked, RATE_HZ, "force", "N", ("x",)), Signal(moved, RATE_HZ, "position", "m", ("x",)))
+    measure = make_force_measure([Recording("heavy", *signals)], make_body(mass=1e9), 5.0).measure
+    (record,) = measure.records
+    compared = record.fit | record.choose | record.test
+    assert np.std(record.measured) > 3 * np.std(record.measured[compared])
+    assert measure.noise[0] == pytest.approx(np.std(record.measured[compared]), rel=0.01)

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.data.observed_parts import cut_part
 from analysis.diagnosis.data.spectral_lines import compute_hold_samples, find_detection_lines
 from analysis.diagnosis.limits import DISTORTION_P
 from analysis.diagnosis.localisation.distortion import find_distortions
@@ -11,7 +12,7 @@ from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 
 
 def distortions_of(recording):
-    return find_distortions(recording, estimate_noise_floor(recording))
+    return find_distortions([recording], [estimate_noise_floor(recording)])
 
 
 def whole_band_trends(trends, output, input):
@@ -153,3 +154,18 @@ def test_linear_shared_cases_have_no_distortion(shared, number):
 
     trends = compute_level_trends(distortions_of(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells)
     assert not any(trend.present for trend in trends)
+
+
+def test_levels_in_recordings_of_their_own_are_compared_in_any_order(device):
+    whole = device(cubic=0.02, levels=(1.0, 2.0, 4.0), axes=1).recorded()
+    parts = [cut_part(whole, segment.start, segment.stop) for segment in whole.segments]
+    found, reversed_found = (
+        find_distortions(recordings, [estimate_noise_floor(recording) for recording in recordings])
+        for recordings in (parts, parts[::-1])
+    )
+    assert {cell.amplitude for cell in found.cells} == {1.0, 2.0, 4.0}
+    assert set(found.cells) == set(reversed_found.cells)
+    assert found.remarks == reversed_found.remarks
+    assert not any("one level only" in remark for remark in found.remarks)
+    trends = whole_band_trends(compute_level_trends(found.cells), "ax", "fx")
+    assert trends["odd"].level_dependence in ("rises", "rises from nothing")

@@ -2,7 +2,17 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
+from analysis.diagnosis.document import (
+    Candidate,
+    Diagnosis,
+    Errors,
+    Estimate,
+    Fit,
+    FoundLaw,
+    Mismatch,
+    NamedEffect,
+    Rival,
+)
 from analysis.diagnosis.effect_words import EFFECT_WORDS, LAW_WORDS, get_noun, get_parameter_unit
 from analysis.diagnosis.result.candidate_wording import (
     SENTENCE_COUNT,
@@ -71,6 +81,18 @@ def test_sentences_are_few_however_many_candidates_there_are():
 def test_numbers_have_units_only_where_the_device_is_known():
     assert format_candidate(DRY, DeviceWording(False, ROTATIONAL)) == "dry friction on the x drive, 211 mN m"
     assert format_candidate(DRY) == "dry friction on the x drive, level 0.211 (SI)"
+
+
+def test_a_number_of_an_unknown_unit_of_the_reading_has_no_unit():
+    nonlinear = replace(DRY, effect="sensor_nonlinearity", place="sensor", parameters={"cubic": 0.02})
+    assert format_candidate(nonlinear, DEVICE) == "a nonlinear sensor in the x channel, cubic term 0.0200"
+
+
+def test_a_law_is_a_candidate_with_its_formula():
+    law = FoundLaw("-0.12*tanh(vx/0.001)", ("vx",), "force", "x")
+    drag = replace(DRY, effect="discovered_law", parameters={"p0": -0.12, "p1": 0.001}, law=law)
+    assert format_candidate(drag, DEVICE) == "discovered law on the x drive, F = -0.12*tanh(vx/0.001) N"
+    assert format_candidate(drag) == "discovered law on the x drive, F = -0.12*tanh(vx/0.001)"
 
 
 @pytest.mark.parametrize("effect", LAW_WORDS)

@@ -1,5 +1,7 @@
 """Where no time is known, forces are compared along positions, and no mass, damping, second or hertz is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES, UNTIMED
+from analysis.diagnosis.first_model.choose_structure import choose_structure
 from analysis.diagnosis.result.candidate_wording import DeviceWording
 from analysis.diagnosis.result.wording import describe_place
 from analysis.diagnosis.search.guard import Guard
@@ -44,6 +47,16 @@ def test_the_first_model_is_a_spring(first, recording):
     assert first.model.stiffness[0, 0] == pytest.approx(STIFFNESS, rel=0.1)  # friction bends it
     assert first.model.mass[0, 0] < 0.1 and first.model.damping[0, 0] == 0
     assert "no time is known" in first.remarks[0]
+
+
+@pytest.mark.parametrize("counts_per_m", [1e6, 1e-3])
+def test_mass_and_damping_are_held_alike_in_any_unit_of_the_position(first, recording, counts_per_m):
+    position = replace(recording.response, samples=counts_per_m * recording.response.samples, unit="1")
+    counted = choose_structure([replace(recording, response=position)], "massless", lambda share: None).fit.model
+    for model in (first.model, counted):
+        assert model.tolerance.mass_kg == pytest.approx(1e-6 * model.mass[0, 0])
+        assert model.tolerance.damping_n_s_per_m == pytest.approx(1e-6 * model.stiffness[0, 0])
+    assert counted.stiffness[0, 0] == pytest.approx(first.model.stiffness[0, 0] / counts_per_m, rel=1e-3)
 
 
 def test_friction_is_weighed_and_forces_are_compared_once(first, recording):
