@@ -147,6 +147,11 @@ REFINED_MOST_GAIN = 0.7  # largest gain so required; principle: ln 2, half of th
 # share of the mismatch that the last effect must remove. Bank 93000: four of five effects below it were wrong; right
 # ones removed a fifth or more
 LAST_EFFECT_SHARE = 0.1
+# probability of re-tuned parameters so far from the calibration, below which a small error is not trusted; principle
+IMPROBABLE_DEVIATIONS = 0.01
+# difference of information criteria above which the worse model has essentially no support: Burnham and Anderson, Model
+# Selection and Multimodel Inference, 2002, ch. 2.6
+DECISIVE_CRITERION = 10.0
 # half width of the interval over the distance from zero effect, above which no profile is computed. Bank 93000:
 # effects with a ratio of 6 or more were wrong
 UNDETERMINED_REACH = 5.0

@@ -123,7 +123,7 @@ def _describe_onset(onset: CouplingOnset | str) -> str:
     """Describe in a sentence the frequency at which coupling begins, with its interval if known, and the rule by which
     it was found, or the reason why coupling cannot be judged."""
     if isinstance(onset, str):
-        return f"The onset of coupling was not searched: {onset}."
+        return f"The onset of coupling is not known: {onset}."
     if onset.frequency_hz is None:
         return f"No onset of coupling was found. Rule: {onset.rule}."
     interval_text = ""

@@ -113,6 +113,7 @@ def _print_comparison(crowd: "Crowd", rule: "StaircaseRule", person_count: int, 
     """Print bias, standard deviation and error of each rule on the same simulated people, one run each; without the
     habits of --people and without delivery. person_count: number of people."""
     from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules
+    from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
     from analysis.wording import MISSING
 
     results = compare_rules(crowd, list_compared_rules(rule), person_count, seed)
@@ -121,17 +122,20 @@ def _print_comparison(crowd: "Crowd", rule: "StaircaseRule", person_count: int, 
         return
     typer.echo(f"{'rule':42}{'trials':>7}{'bias':>8}{'sd':>7}{'error':>8}  error x sqrt(trials), dB")
     for row in results:
-        errors_db, widths = (
-            (row.bias_db, row.sd_db, row.error_db, row.error_per_trial_db),
-            ("+8.2f", "7.2f", "8.2f", "10.1f"),
-        )
+        errors_db = (row.bias_db, row.sd_db, row.error_db, row.error_per_trial_db)
         error_texts = [
-            f"{MISSING:>8}" if e is None else f"{e:{width}}" for e, width in zip(errors_db, widths, strict=True)
+            f"{MISSING:>{width}}" if error_db is None else f"{error_db:{sign}{width}.{digits}f}"
+            for error_db, (sign, width, digits) in zip(
+                errors_db, (("+", 8, 2), ("", 7, 2), ("", 8, 2), ("", 10, 1)), strict=True
+            )
         ]
         typer.echo(f"{row.rule:42}{row.trials:7.1f}{''.join(error_texts)}")
     typer.echo(f"{person_count} people, the same under every rule; errors of single runs in dB, root mean square.")
     if stopped_rows := [f"{person_count - row.runs} ({row.rule})" for row in results if row.runs < person_count]:
-        typer.echo(f"Runs that the trial limit stopped have no threshold and no error: {'; '.join(stopped_rows)}.")
+        typer.echo(
+            f"Runs stopped by the trial limit, or without an end in {MOST_TRIALS} trials, have no threshold and no "
+            f"error: {'; '.join(stopped_rows)}."
+        )
     if crowd.rove_db:
         typer.echo(f"Roved by {crowd.rove_db:g} dB, as the protocol says; Psi's levels are not roved.")
     if crowd.guessers or crowd.criterion_drift_sd or crowd.unsure or crowd.delivery is not None:

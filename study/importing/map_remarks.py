@@ -37,10 +37,10 @@ def list_unused_segments(import_map: ImportMap, parts: Sequence[tuple[str, str]]
 def list_name_remarks(import_map: ImportMap, clock: ClockMap, namespace: Namespace) -> Iterator[str]:
     """List a sentence for each array whose name in the file states another unit than the map does for the time stamps
     or a channel of this clock, and for each definition with the name of an array. namespace: the arrays of the clock's
-    file, as they were read."""
+    file, as they were read. The file is not named, so that the sentence is the same for all parts."""
     for name in namespace.definitions:
         if name in namespace.arrays:
-            yield f"[let] {name} is not used: {namespace.file_name} has an array of this name, which has precedence."
+            yield f"[let] {name} is not used: the file has an array of this name, which has precedence."
     is_first = clock is import_map.clock[0]
     channels = [
         channel for channel in import_map.channel if channel.clock == clock.name or (is_first and not channel.clock)
@@ -49,7 +49,7 @@ def list_name_remarks(import_map: ImportMap, clock: ClockMap, namespace: Namespa
     for value, unit in dict.fromkeys(values_and_units):
         if header := _find_contradicting_name(value, unit, namespace):
             stated_unit = parse_signal_name(header).unit
-            yield f"'{header}' of {namespace.file_name} states {stated_unit}, but the map {unit}; the map was followed."
+            yield f"'{header}' states {stated_unit}, but the map {unit}; the map was followed."
 
 
 def _find_contradicting_name(value: str, unit: str, namespace: Namespace) -> str:

@@ -88,12 +88,19 @@ def _extract_last_part(name: str) -> str:
 
 def find_rates(arrays: Arrays) -> Mapping[str, str]:
     """Find the single numbers that are named as a sample rate or sampling interval; returns the name of the number by
-    the expression for the rate in hertz, rates first. A number without a unit is in hertz or seconds."""
+    the expression for the rate in hertz, rates first. A number without a unit is in hertz or seconds; a rate with a
+    unit of time, or an interval with one of frequency, is ambiguous and left out."""
     single_values = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
     named_rates = [
-        name for name in single_values if _RATE_NAME.fullmatch(" ".join(_split_words(_extract_last_part(name))))
+        name
+        for name in single_values
+        if _RATE_NAME.fullmatch(" ".join(_split_words(_extract_last_part(name)))) and not read_factor(name, "s")
     ]
-    intervals = [name for name in single_values if split_name_words(name) & _SAMPLING_INTERVAL_WORDS]
+    intervals = [
+        name
+        for name in single_values
+        if split_name_words(name) & _SAMPLING_INTERVAL_WORDS and not read_factor(name, "Hz")
+    ]
     factors = {name: read_factor(name, "Hz") or 1.0 for name in named_rates}
     return {
         **{name if factors[name] == 1 else f"{factors[name]:.15g} * {quote_name(name)}": name for name in named_rates},

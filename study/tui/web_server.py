@@ -8,6 +8,7 @@ and headers (content security policy, no framing) keep other pages away.
 
 import asyncio
 import base64
+import contextlib
 import hashlib
 import hmac
 import logging
@@ -16,7 +17,7 @@ import secrets
 import shlex
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 
-from aiohttp import web
+from aiohttp import WSCloseCode, web
 from rich.console import Console
 from textual_serve.app_service import AppService
 from textual_serve.server import Server, to_int
@@ -87,13 +88,19 @@ class ScreenServer(Server):
         websocket = web.WebSocketResponse(heartbeat=HEARTBEAT_S)
         await websocket.prepare(request)
 
+        async def send_output(output: bytes) -> None:
+            """Send output of the application; drop it from the end of the connection on, so that the application, whose
+            output is read until it ends, neither stops at a full pipe nor outlives the lock."""
+            with contextlib.suppress(ConnectionError):
+                await websocket.send_bytes(output)
+
         async def close_connection() -> None:
             """Close the connection, when the application ends."""
             await websocket.close()
 
         application = AppService(
             self.command,
-            write_bytes=websocket.send_bytes,
+            write_bytes=send_output,
             write_str=websocket.send_str,
             close=close_connection,
             download_manager=self.download_manager,
@@ -107,6 +114,8 @@ class ScreenServer(Server):
         except Exception:
             logging.getLogger(__name__).exception("The connection of the page failed")
         finally:
+            if websocket.close_code == WSCloseCode.ABNORMAL_CLOSURE and request.transport is not None:
+                request.transport.abort()  # output that a silent browser does not take would be waited for
             await application.stop()
         return websocket
 

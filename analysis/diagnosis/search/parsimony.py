@@ -9,6 +9,7 @@ and a special case before the more general law, unless the latter's error is sma
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.special import gammaincc
 
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.limits import (
@@ -18,7 +19,9 @@ from analysis.diagnosis.limits import (
     AS_GOOD_SHARE,
     CONVINCING_ERROR,
     CONVINCING_SHARE,
+    DECISIVE_CRITERION,
     EXPLAINED_ERROR,
+    IMPROBABLE_DEVIATIONS,
     LAW_REPLACES_RATIO,
     NOISE_ACCURACY,
     NOISE_ALONE,
@@ -96,6 +99,20 @@ def _compute_information_criterion(candidate: FittedCandidate) -> float:
     only candidates with equal errors are compared by it."""
     deviations = candidate.fitted.deviations
     return 2.0 * len(candidate.fitted.hypothesis.point) + float(deviations @ deviations)
+
+
+def has_improbable_deviations(candidate: FittedCandidate) -> bool:
+    """Whether the re-tuned parameters of the model deviate from the calibration by more than its tolerances explain:
+    |d|² is significant in a chi-square test with a degree of freedom per parameter (`IMPROBABLE_DEVIATIONS`)."""
+    deviations = candidate.fitted.deviations
+    return bool(gammaincc(len(deviations) / 2, float(deviations @ deviations) / 2) < IMPROBABLE_DEVIATIONS)
+
+
+def is_more_probable(current: FittedCandidate, replacement: FittedCandidate) -> bool:
+    """Whether a replacement has no larger error than the current candidate, chance aside, and an information criterion
+    that is lower by `DECISIVE_CRITERION` or more."""
+    difference = _compute_information_criterion(current) - _compute_information_criterion(replacement)
+    return difference >= DECISIVE_CRITERION and are_inseparable(current, replacement)
 
 
 def is_refined_candidate(general: FittedCandidate, special: FittedCandidate) -> bool:

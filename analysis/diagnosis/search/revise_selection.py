@@ -1,9 +1,10 @@
 """Revise the effects that forward selection found: exchange one for another, or drop one (backward elimination).
 
-Forward selection chooses the first effect while that effect alone must explain the whole error, so that the choice may
-be a compromise. The first effect is therefore searched for again with the later effects kept; where another effect fits
-better, it replaces the first and becomes the last in the order. This is repeated until no replacement fits better, or
-every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3).
+Forward selection chooses the first effect while that alone must explain the whole error: it may be a compromise. It is
+therefore searched for again with the later effects kept; an effect that fits better replaces it, and becomes the last
+in the order. This is repeated until none fits better, or every effect has been tried once (Miller, Subset Selection in
+Regression, 2002, ch. 3). A fit near the noise is revised where its re-tuned parameters contradict the calibration: by
+an effect that fits as well with far more probable parameters.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,13 +18,15 @@ from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.limits import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.next_effect import (
-    Step,
-    compare_plausible_fits,
-    find_first_fits,
-    find_next_effect,
+from analysis.diagnosis.search.next_effect import Step, compare_plausible_fits, find_first_fits, find_next_effect
+from analysis.diagnosis.search.parsimony import (
+    has_improbable_deviations,
+    has_small_error,
+    is_more_probable,
+    is_worthwhile,
+    list_relatives,
+    move_preferred_first,
 )
-from analysis.diagnosis.search.parsimony import has_small_error, is_worthwhile, list_relatives, move_preferred_first
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.search.verdict import compute_step_shares, is_near_noise, is_worth_naming
@@ -66,10 +69,8 @@ def remove_effect(context: SearchContext, explanation: Explanation, effect_index
 def remove_last_refitted(context: SearchContext, explanation: Explanation) -> Explanation:
     """Remove the last of at least two effects. The others keep the fit from before it was added, or are refitted from
     their values in the fit with it, whichever has the smaller cost (the cost may have several minima)."""
-    last_index, explanation_without_last = (
-        len(explanation.steps) - 1,
-        remove_effect(context, explanation, len(explanation.steps) - 1),
-    )
+    last_index = len(explanation.steps) - 1
+    explanation_without_last = remove_effect(context, explanation, last_index)
     refitted_candidate = context.score_fit(
         refine(context, _omit_effect(context, explanation.steps[-1], last_index).fitted)
     )
@@ -155,13 +156,15 @@ def exchange_first_effects(
     time_left: TimeBudget,
 ) -> Explanation:
     """Exchange the first effect for one of the catalogue that fits better with the others, at most as often as there
-    are effects. Ends where the error is small (`has_small_error`), where effects may not be changed (`_can_exchange`),
-    or where `_exchange_first` finds no replacement."""
+    are effects. Ends where the error is small (`has_small_error`) with re-tuned parameters that agree with the
+    calibration (`has_improbable_deviations`), where effects may not be changed (`_can_exchange`), or where
+    `_exchange_first` finds no replacement."""
     limited_context = replace(context, map_=limit_map(context.map_, time_left))
     for _ in explanation.steps:
-        if not _can_exchange(context, explanation, time_left) or has_small_error(
-            explanation.retuned, explanation.after
-        ):
+        is_settled = has_small_error(explanation.retuned, explanation.after) and not has_improbable_deviations(
+            explanation.after
+        )
+        if is_settled or not _can_exchange(context, explanation, time_left):
             break
         exchanged = _exchange_first(
             limited_context,
@@ -197,11 +200,13 @@ def exchange_first_for_relatives(
 
     The candidates start from the explanation without the first effect, the other values unchanged; only a candidate
     with a smaller cost than the explanation is fitted further. The first effect is among the candidates, so that a
-    refinement must reduce the error by as much as in any step. Unchanged where effects may not be changed
-    (`_can_exchange`), the first effect has no relatives in the catalogue, or `_exchange_first` finds no replacement.
+    refinement must reduce the error by as much as in any step. Unchanged where the error is at most `EXPLAINED_ERROR`,
+    effects may not be changed (`_can_exchange`), the first effect has no relatives in the catalogue, or
+    `_exchange_first` finds no replacement.
     """
     related_effects = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
-    if len(related_effects) < 2 or not _can_exchange(context, explanation, time_left):
+    is_improvable = explanation.after.score.worst_channel > EXPLAINED_ERROR
+    if len(related_effects) < 2 or not is_improvable or not _can_exchange(context, explanation, time_left):
         return explanation
     limited_context, last_step = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
     sites = explanation.steps[0].fitted.hypothesis.claims[-1].sites
@@ -237,10 +242,9 @@ def _move_first_to_end(context: SearchContext, candidate: FittedCandidate) -> Fi
 
 def _can_exchange(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> bool:
     """Whether two or more effects were found, none of them is fixed (certain effects, reference recordings, a search
-    that ended early, an excluded name), the error is above `EXPLAINED_ERROR`, and time is left."""
+    that ended early, an excluded name), and time is left."""
     is_fixed = context.certain or context.references is not None or explanation.ended_early or explanation.excluded_name
-    is_improvable = len(explanation.steps) > 1 and explanation.after.score.worst_channel > EXPLAINED_ERROR
-    return not is_fixed and is_improvable and time_left()
+    return not is_fixed and len(explanation.steps) > 1 and time_left()
 
 
 def _make_exchange_step(progress: Progress) -> Step:
@@ -255,8 +259,8 @@ def _exchange_first(
     compare_replacements: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]],
 ) -> Explanation | None:
     """Replace the first effect by the preferred candidate, which becomes the last in the order. None without
-    candidates, where that one is excluded or not worthwhile (`is_worthwhile`), the time is over, or the comparison
-    crashes.
+    candidates, where that one is excluded or neither worthwhile (`is_worthwhile`) nor decisively more probable
+    (`is_more_probable`), the time is over, or the comparison crashes.
     compare_replacements: returns the explanation without the first effect, and the candidates in its place, the
     preferred one first."""
 
@@ -271,24 +275,20 @@ def _exchange_first(
     if comparison is None:
         return None
     explanation_without_first, ranked_candidates = comparison
-    nameable_candidates = tuple(
-        candidate for candidate in ranked_candidates if candidate.newest not in context.excluded
-    )
-    if (
-        not nameable_candidates
-        or nameable_candidates[0] is not ranked_candidates[0]
-        or not is_worthwhile(explanation.steps[-1], nameable_candidates[0])
-    ):
+    preferred, last_step = next(iter(ranked_candidates), None), explanation.steps[-1]
+    if preferred is None or preferred.newest in context.excluded:
+        return None
+    if not (is_worthwhile(last_step, preferred) or is_more_probable(last_step, preferred)):
         return None
     # Rivals of the former first effect are not those of the effect that is first now.
     rounds = (
         explanation_without_first.rounds[0][:1],
         *explanation_without_first.rounds[1 : len(explanation_without_first.steps)],
-        nameable_candidates,
+        tuple(candidate for candidate in ranked_candidates if candidate.newest not in context.excluded),
     )
     return replace(
         explanation_without_first,
-        after=context.with_test_score(nameable_candidates[0]),
+        after=context.with_test_score(preferred),
         rounds=rounds,
-        steps=(*explanation_without_first.steps, nameable_candidates[0]),
+        steps=(*explanation_without_first.steps, preferred),
     )

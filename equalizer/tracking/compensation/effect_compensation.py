@@ -89,11 +89,12 @@ def compensate(
     effect_reasons = [(effect, explain_not_compensated(effect, model.input_channels)) for effect in physics.effects]
     compensated_effects = tuple(effect for effect, reason in effect_reasons if not reason)
     axis_gains = compute_axis_gains(physics, model.input_channels, model.output_channels)
+    to_axes = compute_channels_to_axes(physics, reference.shape[1])
     scaled_forces, compensating_forces = forces.copy(), np.zeros_like(forces)
     for effect, axis in _iterate_effects_by_axis(compensated_effects, model):
         if effect.kind in LAWS or _is_force_law(effect):
             compensating_forces[:, axis] += (
-                _compute_force_beyond_model(effect, axis, motion, model, identified_with_n) / axis_gains[axis]
+                _compute_force_beyond_model(effect, axis, motion, model, to_axes, identified_with_n) / axis_gains[axis]
             )
     for effect, axis in _iterate_effects_by_axis(compensated_effects, model):
         if effect.kind == "force_deadband":
@@ -107,22 +108,27 @@ def compensate(
 
 
 def convert_motion_to_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
-    """Convert a motion along the response channels to one along the driven axes, on which the effects act. Where the
-    responses measure rotated axes, it is rotated back. Elsewhere the sign of an axis is reversed where the diagonal of
-    the product of output matrix and driven axes is negative. Unchanged where that product has fewer rows or columns
-    than the motion has axes."""
-    driven_axes, axis_count = compute_driven_axes(physics), motion.position.shape[1]
+    """Convert a motion along the response channels to one along the driven axes, on which the effects act."""
+    to_axes = compute_channels_to_axes(physics, motion.position.shape[1])
+    return PlannedMotion(motion.position @ to_axes, motion.velocity @ to_axes, motion.acceleration @ to_axes)
+
+
+def compute_channels_to_axes(physics: MechanicalModel, axis_count: int) -> FloatArray:
+    """Compute the matrix (axis_count, axis_count) by which a row of samples of the response channels is multiplied to
+    give the motion along the driven axes. Where the responses measure rotated axes, it rotates them back. Elsewhere it
+    reverses the sign of an axis where the diagonal of the product of output matrix and driven axes is negative. It is
+    the identity where that product has fewer rows or columns than axis_count."""
+    driven_axes = compute_driven_axes(physics)
     channel_gains = physics.output @ driven_axes
     if min(channel_gains.shape) < axis_count:
-        return motion
+        return np.eye(axis_count)
     signs = np.where(np.diagonal(channel_gains)[:axis_count] < 0, -1.0, 1.0)
     is_rotation = (
         channel_gains.shape == (axis_count, axis_count)
         and np.allclose(channel_gains @ channel_gains.T, np.eye(axis_count))
         and np.allclose(channel_gains @ driven_axes.T, physics.output)
     )
-    to_axes = channel_gains if is_rotation else np.diag(signs)
-    return PlannedMotion(motion.position @ to_axes, motion.velocity @ to_axes, motion.acceleration @ to_axes)
+    return np.asarray(channel_gains if is_rotation else np.diag(signs))
 
 
 def find_effect_axes(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
@@ -168,10 +174,16 @@ def _iterate_effects_by_axis(
 
 
 def _compute_force_beyond_model(
-    effect: ModelEffect, axis: int, motion: PlannedMotion, model: IdentifiedModel, identified_with_n: float | None
+    effect: ModelEffect,
+    axis: int,
+    motion: PlannedMotion,
+    model: IdentifiedModel,
+    to_axes: FloatArray,
+    identified_with_n: float | None,
 ) -> FloatArray:
     """Compute the force (N,), N, that compensates an effect along the motion, minus its linear equivalent at the
-    amplitude of the identification, which the model contains; the complete force where identified_with_n is None."""
+    amplitude of the identification, which the model contains; the complete force where identified_with_n is None.
+    to_axes: from `compute_channels_to_axes`."""
     velocity = motion.velocity[:, axis]
     slip_mps = compute_slip_speed(velocity)
     law, force = evaluate_force_law(effect, axis, motion, (model.input_channels, model.sample_rate_hz), slip_mps)
@@ -180,7 +192,7 @@ def _compute_force_beyond_model(
     padded_length = find_padded_length(len(velocity), model.sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(padded_length, 1 / model.sample_rate_hz), dtype=np.float64)
     band_lines = np.flatnonzero(compute_band_gain(lines_hz, model.band_hz) > 0)
-    direct_gain = np.abs(compute_model_response(model, lines_hz[band_lines])[:, axis, axis])
+    direct_gain = np.abs(compute_model_response(model, lines_hz[band_lines])[:, :, axis] @ to_axes[:, axis])
     speed_amplitudes = np.maximum(
         direct_gain * identified_with_n / (2 * np.pi * lines_hz[band_lines]), MIN_SPEED_AMPLITUDE_MPS
     )

@@ -48,8 +48,7 @@ def compute_periodic_command(
 ) -> Signal:
     """Compute one period of forces (N, m), in newtons, for one period of reference outputs (N, p), N >= 1.
 
-    Raises OutsideBandError where the reference has content outside the model's band, ValueError for a rate, a number of
-    channels or units other than the model's.
+    Raises OutsideBandError where the reference has content outside the model's band, ValueError as `check_reference`.
     """
     check_reference(model, reference)
     sample_count = len(reference)

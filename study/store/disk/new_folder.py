@@ -19,9 +19,11 @@ from study.store.disk.privacy import make_folder
 
 def require_new_folder(folder: Path) -> None:
     """Check that results can be written to `folder`. Raises StudyError where it exists and is not an empty folder, or
-    where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable, or the folder or
-    its parent cannot be examined."""
+    where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable, the folder is a
+    link that leads in a circle, or the folder or its parent cannot be examined."""
     try:
+        if _follow_links(folder).is_symlink():
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         parent = _follow_links(folder).parent
         is_empty, exists, has_parent = (
             folder.is_dir() and not any(folder.iterdir()),

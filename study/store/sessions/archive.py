@@ -65,7 +65,8 @@ class SessionFolder:
     def withdrawn(self) -> bool:
         """Whether the session was withdrawn, or its withdrawal has begun; False where its folder cannot be read, so
         that reading the log reports that."""
-        return os.path.exists(self.tombstone) or os.path.exists(self.withdrawal)  # noqa: PTH110 - Path.exists raises
+        # The tombstone is written before the record is erased: in the other order, a withdrawal could end in between.
+        return os.path.exists(self.withdrawal) or os.path.exists(self.tombstone)  # noqa: PTH110 - Path.exists raises
 
     @property
     def erasure_status(self) -> str:
@@ -189,9 +190,9 @@ def parse_session_number(name: str) -> int:
 
 def require_single_folder(session: str, data: Path) -> None:
     """Raise WrongUseError where both the current folder and the data folder hold a folder of this name: a command must
-    not change, or erase, the session of another study."""
+    not change, or erase, the session of another study. `.` and `..` are paths, and mean the session alone."""
     here, there = Path(session), data / session
-    if here.is_dir() and there.is_dir() and not here.samefile(there):
+    if here.name not in ("", "..") and here.is_dir() and there.is_dir() and not here.samefile(there):
         raise WrongUseError(
             "Two sessions have this name",
             f"{here.resolve()} and {there.resolve()} could both be meant.",

@@ -112,11 +112,13 @@ class RequestInbox:
             elif not name.startswith(_NOTE_PREFIX):
                 self._remove(name)
 
-    def forget_logged(self) -> None:
-        """Remove the notes that were taken: all of them are in the log now. Never raises."""
-        for name in self._list_names():
-            if name.startswith(_TAKEN_PREFIX):
+    def forget_logged(self, note: NoteAsked) -> None:
+        """Remove the file of this note, which was taken and is in the log now; only the oldest of equal ones. Never
+        raises."""
+        for name in sorted(self._list_names()):
+            if name.startswith(_TAKEN_PREFIX) and _parse_request(_read_content(self._folder / name)) == note:
                 self._remove(name)
+                return
 
     def take(self) -> tuple[Request, ...]:
         """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first; invalid ones other than

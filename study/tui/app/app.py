@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar
 
 from textual.app import App, SystemCommand
@@ -97,7 +98,8 @@ class HapteqApp(App[None]):
             await self._begin_sitting(self._start_options.first_sitting)
         else:
             await self._archive.show_home()
-        self.set_interval(DIALOG_POLL_INTERVAL_S, self._release_held_messages)
+        # By `call_later`, in turn with the engine's messages: the timer itself runs in another task.
+        self.set_interval(DIALOG_POLL_INTERVAL_S, partial(self.call_later, self._release_held_messages))
         self.call_after_refresh(self._start_engine)
 
     async def _release_held_messages(self) -> None:

@@ -48,7 +48,7 @@ from study.tui.screens.practice_over import PracticeOverScreen
 from study.tui.screens.preparing import PreparingScreen
 from study.tui.screens.rest import RestScreen
 from study.tui.screens.trial import TrialScreen
-from study.tui.trial_replies import LEAVING
+from study.tui.trial_replies import LEAVING, PAUSE
 
 SCREENS: dict[DisplayCall, Callable[[Any, Words], Screen[Any]]] = {
     DisplayCall.FILL_IN: FormScreen,
@@ -65,6 +65,8 @@ the other requests, except that of a trial."""
 
 TEXT_DIALOGS = (NoteScreen, ConfirmView, NotePrompt)
 """Dialogs of the experimenter that may be opened above any screen of a sitting, and into which text is typed."""
+STIMULUS_CALLS = (DisplayCall.SHOW_PLAYING, DisplayCall.ASK)
+"""Requests during which a stimulus may play."""
 
 
 def make_screen(request: ScreenRequest, keys: AnswerKeys, words: Words) -> Screen[Any]:
@@ -124,15 +126,19 @@ class SittingScreens:
 
     async def handle_message(self, message: FromEngine) -> None:
         """Handle one message of the engine; those that do not concern a sitting are ignored. While a person types into
-        a dialog, other screens wait (`release_held_messages`): the next characters must not be answers or commands."""
-        is_waiting = bool(self._held_messages) or self._is_dialog_open
-        if isinstance(message, ScreenRequest | CloseRequest | Feedback) and is_waiting:
-            self._held_messages.append(message)
-        else:
+        a dialog, other screens wait (`release_held_messages`): the next characters must not be answers or commands. A
+        stimulus does not wait: a pause is requested in its place, so that none is played without its screen."""
+        await self.release_held_messages()
+        if not isinstance(message, ScreenRequest | CloseRequest | Feedback) or not self._is_dialog_open:
             await self._perform(message)
+        elif isinstance(message, ScreenRequest) and message.call in STIMULUS_CALLS:
+            self._send(Reply(message.number, PAUSE))
+        else:
+            self._held_messages.append(message)
 
     async def release_held_messages(self) -> None:
-        """Handle the messages that were held back, once no dialog is open. Called at intervals."""
+        """Handle the messages that were held back, once no dialog is open. Called at intervals, never during
+        `handle_message`."""
         while self._held_messages and not self._is_dialog_open:
             await self._perform(self._held_messages.pop(0))
 
@@ -173,6 +179,7 @@ class SittingScreens:
         """Show that a slow step is under way (device, report), while no request is open. sentence: current step, empty
         before the language is known."""
         self._pending_number, self._request_screen, self._trial_screen = 0, None, None
+        self._held_messages.clear()
         if self._preparing_screen is None:
             self._preparing_screen = PreparingScreen(sentence)
             await self._app.push_screen(self._preparing_screen)

@@ -23,6 +23,7 @@ from study.store.sessions.archive import FOLDER_PATTERN
 from study.workflows.files.file_content import FileContent, read_file_content
 from study.workflows.files.recognisers import RECOGNISERS, Recogniser, describe_recording
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
+from study.workflows.recording.read_any_recording import HAPTEQ_PREFIX
 
 KNOWN_KINDS = (
     "known are recordings, identified models and calibrations (HDF5), mechanical models, protocols and import maps "
@@ -100,11 +101,11 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     kind, problem = _describe_unknown(content)
     unknown_validation = Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
     may_be_foreign = path.is_file() and path.suffix.lower() in (*FOREIGN_ENDINGS, *HDF5_ENDINGS)
-    if not may_be_foreign:
+    stated_format = content.hdf5_format or content.json_format or ""
+    if not may_be_foreign or stated_format.startswith(HAPTEQ_PREFIX):
         return unknown_validation
     foreign_validation = _validate_foreign(path, kind, unknown_validation.problems)
-    states_format = bool(content.hdf5_format or content.json_format)
-    return unknown_validation if states_format and foreign_validation.problems else foreign_validation
+    return unknown_validation if stated_format and foreign_validation.problems else foreign_validation
 
 
 def _is_foreign(path: Path) -> bool:

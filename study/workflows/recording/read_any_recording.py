@@ -11,14 +11,14 @@ from study.errors import StudyError
 from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.formats.recording_file import read_recording
 
-_HAPTEQ_PREFIX = "hapteq"
+HAPTEQ_PREFIX = "hapteq"
 """Beginning of the names of hapteq's formats; a file of another program may state a format, too."""
 
 
 def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
     """Read a recording, and return it with the remarks on its import (none for a hapteq recording). Raises StudyError
     where the file cannot be read, is invalid, or can only be imported with an import map."""
-    if path.is_file() and is_hdf5(path) and read_format(path).startswith(_HAPTEQ_PREFIX):
+    if path.is_file() and is_hdf5(path) and read_format(path).startswith(HAPTEQ_PREFIX):
         return read_recording(path), ()
     # Imported here, because these modules take longer to load than a hapteq recording to read.
     from study.importing.arrays.read_arrays import FOREIGN_ENDINGS

@@ -64,8 +64,10 @@ def analyze_data(
     pictures = draw_study_pictures(analysis, ellipses)
     _create_private_folder(out_folder, data)
     note_written_folder(data, out_folder)
-    _write_files(out_folder, analysis, pictures, ellipses, provenance, collected_trials)
-    _remove_if_withdrawn(out_folder, collected_trials)
+    try:
+        _write_files(out_folder, analysis, pictures, ellipses, provenance, collected_trials)
+    finally:  # also after an error: the withdrawal may have erased a folder that was being written
+        _remove_if_withdrawn(out_folder, collected_trials)
     return WrittenAnalysis(
         thresholds=analysis.thresholds,
         table=tuple(format_threshold_lines(analysis)),
@@ -193,15 +195,18 @@ def _write_files(
 
 def _remove_if_withdrawn(folder: Path, collected_trials: CollectedTrials) -> None:
     """Remove the files of the analysis, and raise StudyError, where a participant withdrew since the sessions were
-    collected."""
+    collected; it names the files that cannot be removed."""
     try:
         require_consent(collected_trials.sessions)
-    except StudyError:
+    except StudyError as error:
         for path in list_analysis_outputs(folder):
-            path.unlink(missing_ok=True)
+            with suppress(OSError):
+                path.unlink()
         for emptied_folder in (folder / "figures", folder):
             with suppress(OSError):  # it holds files of others
                 emptied_folder.rmdir()
+        if remaining_paths := list_analysis_outputs(folder):
+            error.saved = f"Could not be removed, erase them: {', '.join(str(path) for path in remaining_paths)}."
         raise
 
 

@@ -31,7 +31,7 @@ from study.workflows.trial.demonstrate import demonstrate
 from study.workflows.trial.masking import check_masking, start_masking, stop_masking
 from study.workflows.trial.play_probe import play_probe, play_reference
 from study.workflows.trial.present_trial import present_trial
-from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, write_notes
+from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, write_last_notes, write_notes
 from study.workflows.trial.take_pause import take_pause
 
 MAX_VOIDS_IN_A_ROW = 3
@@ -60,7 +60,7 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     KeyboardInterrupt (Ctrl-C, a closed terminal) stops the device at once and is raised as UserInterruptError, or as
     DeviceError where the force may still be on; a session that is closed in the log, or whose participant is
     ineligible, ends normally instead. A StudyError is extended by the number of saved answers and the resume command.
-    In both cases notes that are not logged yet are logged first.
+    In both cases notes that are not logged yet are logged first, where that is possible.
     """
     try:
         session_end = _run_sitting(state, sitting)
@@ -107,7 +107,7 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
     """End a sitting after an interruption. If the participant does not take part, or the session is closed in the log
     and the force is off, its end is returned. Otherwise the interruption is logged, and UserInterruptError is raised;
     DeviceError where the force may still be on."""
-    state = fold_session(sitting.folder).state
+    state = write_last_notes(fold_session(sitting.folder).state, sitting)
     may_force_remain = sitting.device.fault() is Fault.FORCE_LEFT
     if state.is_finally_ineligible:  # nothing was played; its last line may be missing
         state = state if state.closed else close_ineligible_session(state, sitting)
@@ -116,7 +116,6 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
         return SessionEnd(state, end_reason="")
     # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
-        write_notes(state, sitting)
         sitting.log.append(
             SessionInterrupted(
                 utc=sitting.clock.utc(),
@@ -142,7 +141,7 @@ def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
             error.saved = f"{format_answer_count(state.answers)} on disk."
             resume_command = format_resume_command(str(sitting.folder.path), sitting.device_name)
             error.do_now = f"{error.do_now} Then continue with: {resume_command}"
-        write_notes(state, sitting)
+        write_last_notes(state, sitting)
     return error
 
 

@@ -196,16 +196,21 @@ def _add_to_plan(plan: Withdrawal, later_plan: Withdrawal) -> Withdrawal:
 
 def _lock_for_erasing(data: Path, names: Iterable[str], locks: ExitStack) -> None:
     """Lock sessions and their logs until `locks` is closed. Raises OSError unless real folders are at their paths, and
-    StudyError if a session is running."""
+    StudyError if a session is running, which also says whether the withdrawal has begun."""
     for folder in (SessionFolder(data / name) for name in names):
         if not is_real_folder(folder.path):
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
         lock_path = folder.path / SESSION_LOCK_NAME
         if lock_path.is_symlink():
             lock_path.unlink()
-        locks.enter_context(hold_session_lock(folder.path))
-        if is_real_file(folder.log):
-            locks.enter_context(hold_log_lock(folder.log))
+        try:
+            locks.enter_context(hold_session_lock(folder.path))
+            if is_real_file(folder.log):
+                locks.enter_context(hold_log_lock(folder.log))
+        except StudyError as error:
+            if is_real_file(folder.withdrawal):
+                error.saved = f"Nothing was erased now, but no session of {folder.subject} counts as data any more."
+            raise
 
 
 def _erase_session(data: OpenedFolder, folder: SessionFolder) -> None:

@@ -11,6 +11,7 @@ from typing import Protocol
 from equalizer.tracking.feedforward.equalizer import Equalizer
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, PlaybackResult
+from study.errors import StudyError
 from study.session.facts.events import Event, NoteTaken
 from study.session.facts.log_time import ClockStep
 from study.session.state.fold import apply_event
@@ -112,14 +113,22 @@ def notify_experimenter(sentence: str, sitting: Sitting) -> None:
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
-    """Take pending requests, then log all notes since the last call."""
+    """Take pending requests, then log all notes since the last call. Raises as `log_and_apply`; the notes of other
+    programs that are not logged then are kept for the next sitting."""
     sitting.supervisor.listen()
-    if not (notes := sitting.supervisor.take_notes()):
-        return state
-    for note in notes:
+    inbox = RequestInbox(sitting.folder.path)
+    for note in sitting.supervisor.take_notes():
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
         state = log_and_apply(state, event, sitting)
-    RequestInbox(sitting.folder.path).forget_logged()
+        inbox.forget_logged(note)
+    return state
+
+
+def write_last_notes(state: SessionState, sitting: Sitting) -> SessionState:
+    """Log notes as `write_notes` does, at the end of a sitting: neither a full disk nor a closed screen hides why it
+    ended."""
+    with contextlib.suppress(StudyError, OSError, KeyboardInterrupt):
+        return write_notes(state, sitting)
     return state
 
 

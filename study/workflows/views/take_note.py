@@ -56,7 +56,7 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
             waiting_notes = [request for request in inbox.take() if isinstance(request, NoteAsked)]
             for each in waiting_notes if is_sent else (*waiting_notes, note):
                 log.append(NoteTaken(utc=clock.utc(), who=each.who, text=each.text, adverse=each.adverse))
-            inbox.forget_logged()
+                inbox.forget_logged(each)
             if folded_session.state.closed:
                 seal_log(folder.log)
         finally:

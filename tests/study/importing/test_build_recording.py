@@ -84,3 +84,19 @@ def test_a_name_with_its_unit_that_is_not_in_the_file_is_named_as_a_whole(files,
     assert sentence in refusal(text, files(**{"u [kN]": U, "y": Y}))
     with_index = built(map_text().replace('value = "u"', 'value = "u[m]"'), files(u=np.stack([U, Y]), y=Y, m=1.0))
     np.testing.assert_array_equal(with_index.recording.command.samples[:, 0], Y)
+
+
+@pytest.mark.parametrize("value", ["volts - 2 * mean(volts)", "u[0] + 2 * (volts)", "2 * u[Sec]"])
+def test_an_array_that_is_named_as_a_unit_may_stand_in_brackets_at_the_end(files, value):
+    found = built(
+        map_text().replace('value = "u"', f'value = "{value}"'),
+        files(u=np.stack([U, Y]), y=Y, volts=U, Sec=1.0),
+    ).recording.command.samples[:, 0]
+    wanted = {"v": U - 2 * U.mean(), "u": 3 * U, "2": 2 * Y}[value[0]]
+    np.testing.assert_allclose(found, wanted)
+
+
+def test_what_all_parts_contradict_is_reported_once(files):
+    paths = [files(name, **{"u [kN]": U, "y": Y}) for name in ("a.npz", "b.npz")]
+    notes = build_recording(parse_map(map_text(), Path("m.toml")), paths).notes
+    assert [note for note in notes if "kN" in note] == ["'u [kN]' states kN, but the map N; the map was followed."]

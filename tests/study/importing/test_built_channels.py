@@ -144,9 +144,9 @@ def test_a_unit_or_a_definition_that_the_file_contradicts_is_reported(files):
     path = files(**{"u [kN]": U, "y": Y, "t [ms]": np.arange(N)})
     found = built(map_text('time = "t"\ntime_unit = "s"', top='let = { y = "2 * y", gain = "3" }\n'), path)
     assert [note for note in found.notes if "rate" not in note] == [
-        "[let] y is not used: a.npz has an array of this name, which has precedence.",
-        "'t [ms]' of a.npz states ms, but the map s; the map was followed.",
-        "'u [kN]' of a.npz states kN, but the map N; the map was followed.",
+        "[let] y is not used: the file has an array of this name, which has precedence.",
+        "'t [ms]' states ms, but the map s; the map was followed.",
+        "'u [kN]' states kN, but the map N; the map was followed.",
     ]
     text = map_text('time = "t"\ntime_unit = "ms"').replace('"N"', '"kN"')
     assert built(text, path).notes == ()

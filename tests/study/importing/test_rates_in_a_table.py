@@ -79,3 +79,15 @@ def test_its_unit_counts(tmp_path, name, first, rate):
     with pytest.raises(MapNeededError) as needed:
         read_foreign((table(tmp_path, f"u,y,{name}", first),), None)
     assert f'rate = "{rate}"           # in hertz\n' in needed.value.skeleton
+
+
+@pytest.mark.parametrize("name", ["sampling [s]", "rate [ms]", "dt_Hz"])
+def test_a_rate_in_seconds_and_a_step_in_hertz_are_not_taken(tmp_path, name):
+    with pytest.raises(MapNeededError, match="no number is the sample rate") as needed:
+        read_foreign((table(tmp_path, f"force [N],travel [mm],{name}", "0.004"),), None)
+    assert "\nrate = " not in needed.value.skeleton
+
+
+def test_a_rate_whose_name_has_the_word_of_a_step_is_a_rate_only(tmp_path):
+    found = read_foreign((table(tmp_path, "force [N],travel [mm],ts sampling rate [Hz]", "250"),), None)
+    assert found.recording.sample_rate_hz == 250

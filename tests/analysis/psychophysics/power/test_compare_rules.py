@@ -15,6 +15,7 @@ from protocols.document.dumping import dump_protocol
 from protocols.procedure.psi import compute_posterior, estimate_threshold
 from protocols.procedure.staircase import is_complete, is_finished, step, to_db
 from study.cli.main import app
+from study.cli.power import _print_comparison
 from study.store.formats.protocol_files import read_study_protocol
 from tests.analysis.conftest import GUESSER, PUBLISHED
 
@@ -81,6 +82,14 @@ def test_what_a_protocol_sets_for_its_staircase_does_not_hold_for_psi(change):
     assert staircase.runs == (0 if stopped else 2)
     assert (staircase.error_db is None) == (staircase.bias_db is None) == stopped
     assert json.loads(json.dumps(asdict(staircase), allow_nan=False))["runs"] == staircase.runs
+
+
+def test_the_table_names_runs_without_an_end_and_keeps_its_columns(capsys):
+    """There is no trial limit: far below the threshold, nine right answers in a row hardly occur."""
+    _print_comparison(Crowd((5.0,), (9.0,)), replace(PUBLISHED, down_after_right=9), 1, 1, False)
+    lines = capsys.readouterr().out.splitlines()
+    assert len({len(line) for line in lines[1:6]}) == 1
+    assert "or without an end in 2000 trials, have no threshold and no error: 1 (staircase, new step after" in lines[7]
 
 
 def test_sessions_analyse_such_runs(simulate):

@@ -183,12 +183,14 @@ TURNED = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 @pytest.mark.parametrize("text", ["-5.0*vy*abs(vy) - 30.0*y", "-30.0*vx*x"])
-def test_the_motion_of_a_turned_sensor_is_turned_back_to_the_axes(text):
-    """The sensor's first channel measures the axis y, its second one -x."""
+@pytest.mark.parametrize("identified_with_n", [None, 0.5])
+def test_the_motion_of_a_turned_sensor_is_turned_back_to_the_axes(text, identified_with_n):
+    """The sensor's first channel measures the axis y, its second one -x; so do the outputs of a model, from which the
+    motion in its identification follows."""
     straight = physics(found(text))
-    along_axes = compensate(PUSHED, WANTED, MODEL, straight, None).forces
-    turned = replace(straight, output=TURNED)
-    by_sensor = compensate(PUSHED, WANTED @ TURNED.T, MODEL, turned, None).forces
+    along_axes = compensate(PUSHED, WANTED, MODEL, straight, identified_with_n).forces
+    turned, turned_model = replace(straight, output=TURNED), replace(MODEL, C=TURNED @ MODEL.C, D=TURNED @ MODEL.D)
+    by_sensor = compensate(PUSHED, WANTED @ TURNED.T, turned_model, turned, identified_with_n).forces
     assert np.std(along_axes - PUSHED) > 0
     assert by_sensor == pytest.approx(along_axes, abs=1e-9)
 

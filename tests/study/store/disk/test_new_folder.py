@@ -77,6 +77,12 @@ def test_a_link_is_filled_where_it_leads(tmp_path, is_there):
     assert (tmp_path / "out").is_symlink() and (tmp_path / "disk" / "real" / "a").read_text() == "1"
 
 
+def test_a_link_in_a_circle_is_refused_before_the_results_are_made(tmp_path):
+    (tmp_path / "out").symlink_to(tmp_path / "out")
+    with pytest.raises(CannotWriteError):
+        require_new_folder(tmp_path / "out")
+
+
 def test_the_folder_above_must_be_there(tmp_path):
     with pytest.raises(StudyError, match="There is no folder"):
         require_new_folder(tmp_path / "no" / "out")

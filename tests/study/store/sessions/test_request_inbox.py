@@ -197,7 +197,7 @@ def test_a_note_that_was_taken_and_not_logged_comes_again_at_the_next_sitting(tm
     again = RequestInbox(tmp_path)
     again.clear()
     assert again.take() == (NOTE,)
-    again.forget_logged()
+    again.forget_logged(NOTE)
     assert list(folder.iterdir()) == []
 
 

@@ -85,3 +85,13 @@ def test_a_recording_of_others_may_state_a_format(tmp_path, name):
     found = validate_file(tmp_path / name)
     assert (found.kind, found.problems) == (KIND, ())
     assert read_any_recording(tmp_path / name)[0].sample_rate_hz == 100
+
+
+def test_a_file_in_an_unknown_format_of_hapteq_is_no_recording_of_others(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs["format"] = "hapteq-later"
+        for key, samples in zip(("t_s", "force_N", "speed_rpm"), np.array(ROWS).T, strict=True):
+            file[key] = samples
+    found = validate_file(tmp_path / "a.h5")
+    assert (found.kind, len(found.problems)) == ("HDF5 file", 1)
+    assert "calls itself 'hapteq-later'" in found.problems[0]
