@@ -18,7 +18,7 @@ from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
 from study.store.formats.mechanical_model_file import write_mechanical_model
-from study.store.sessions.archive import SessionFolder
+from study.store.sessions.archive import SessionFolder, holds_session
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.crash_guard import make_crash_guard
 from study.workflows.forked_map import map_forked
@@ -26,12 +26,16 @@ from study.workflows.picture_files import DrawnPicture, draw_picture, write_draw
 
 
 def note_sessions(sources: Sequence[Path], out: Path) -> tuple[SessionFolder, ...]:
-    """Note the result's folder in the data folders of the sources that are sessions, so that a withdrawal names it.
-    Returns these sessions."""
-    session_folders = [source for source in sources if source.is_dir()]
+    """Note the result's folder in the data folders of the sources that are sessions, or recordings in one, so that a
+    withdrawal names it. Returns these sessions."""
+    paths = [source.resolve() for source in sources]
+    recorded_in = [path.parent.parent for path in paths if not path.is_dir()]
+    session_folders = dict.fromkeys(
+        [*(path for path in paths if path.is_dir()), *(folder for folder in recorded_in if holds_session(folder))]
+    )
     for session_folder in session_folders:
         note_written_folder(session_folder, out)
-    return tuple(SessionFolder(session_folder.resolve()) for session_folder in session_folders)
+    return tuple(SessionFolder(session_folder) for session_folder in session_folders)
 
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:

@@ -68,10 +68,10 @@ LAW_SECTION = "\n\n".join(
         "a command, it is that of zero signals.",
         "**Signals.** `x`, `vx`, `ax`, `fx` are position, velocity, acceleration and command of the x axis; y and z "
         "likewise. `t` is the time from the first sample, in seconds. The recording's own channel names are allowed, "
-        "too, unless they are one of these names. If channel names do not end in x, y, z, the axes are named x, y, z "
-        "in their order. A law of the force may also use the recording's conditions. They are named `c1`, `c2`, … if a "
-        "condition's channel is not a valid name, or has another meaning. A law of a command may use commands and `t`; "
-        "a law of a response may use responses and `t`.",
+        "too, unless they are one of these names; in a law of a response, a channel's own name comes first. If channel "
+        "names do not end in x, y, z, the axes are named x, y, z in their order. A law of the force may also use the "
+        "recording's conditions. They are named `c1`, `c2`, … if a condition's channel is not a valid name, or has "
+        "another meaning. A law of a command may use commands and `t`; a law of a response may use responses and `t`.",
         "**Free parameters.** Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters: a fit may "
         f"change them. Whole numbers (`2`) are part of the form. A formula has at most {MAX_CHARACTERS} characters, "
         f"{MAX_NODES} parts, and {STACK_SIZE} numbers at once.",

@@ -43,6 +43,17 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
     if is_sent and is_log_locked(folder.log):
         return False
     # The session does not run, or ended before it received the note, which then waits in the inbox.
+    try:
+        _append_notes(folder, () if is_sent else (note,), clock)
+    except StudyError as error:
+        if is_sent:
+            error.saved = "The note is kept in the session's folder, and need not be written again."
+        raise
+    return True
+
+
+def _append_notes(folder: SessionFolder, notes: tuple[NoteAsked, ...], clock: Clock) -> None:
+    """Append the notes of the inbox, then these, to the log of a session that does not run. Raises as `take_note`."""
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         try:
@@ -54,14 +65,13 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
             inbox = RequestInbox(folder.path)
             inbox.clear()
             waiting_notes = [request for request in inbox.take() if isinstance(request, NoteAsked)]
-            for each in waiting_notes if is_sent else (*waiting_notes, note):
-                log.append(NoteTaken(utc=clock.utc(), who=each.who, text=each.text, adverse=each.adverse))
-                inbox.forget_logged(each)
+            for note in (*waiting_notes, *notes):
+                log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
+                inbox.forget_logged(note)
             if folded_session.state.closed:
                 seal_log(folder.log)
         finally:
             log.close()
-    return True
 
 
 def _make_program_note(text: str, clock: Clock) -> NoteTaken:

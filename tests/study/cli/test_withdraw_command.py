@@ -1,10 +1,14 @@
 """Withdrawing from the command line: what is erased, and what is not."""
 
+import errno
 import json
+import os
+from pathlib import Path
 
 import pytest
 
 from study.cli.main import main
+from study.store.disk.file_errors import CannotWriteError
 
 pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
 
@@ -102,3 +106,32 @@ def test_an_export_that_was_under_way_during_a_withdrawal_leaves_nothing(run, da
     assert (code, "P01_001 was withdrawn while its data were read." in err) == (1, True)
     assert f"Written with --out, and not erased: {said[0]}" in err  # it was there at that time
     assert not said[0].exists() and not (data.parent / "ds").exists()
+
+
+@pytest.mark.parametrize("is_kept", [False, True])
+def test_an_analysis_that_fails_during_a_withdrawal_leaves_nothing_or_names_it(run, data, monkeypatch, is_kept):
+    """The withdrawal may erase the folder of figures, so that they cannot be written, after the tables were."""
+    from study.workflows.results import analyze_data
+
+    out, unlink = data / "analysis", Path.unlink
+
+    def refuse(path, missing_ok=False):
+        if path == out / "anova.json":
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        unlink(path, missing_ok)
+
+    def fail(folder, pictures):
+        assert main(["withdraw", "P01_001", "--data", str(data), "--yes"]) == 0
+        out.mkdir(exist_ok=True)
+        for name in ("anova.json", "thresholds.csv"):
+            (out / name).write_text("P01")
+        if is_kept:
+            monkeypatch.setattr(Path, "unlink", refuse)
+        raise CannotWriteError(folder, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT)))
+
+    monkeypatch.setattr(analyze_data, "write_pictures", fail)
+    code, _, err = run("analyze", data)
+    assert (code, "P01_001 was withdrawn while its data were read." in err) == (1, True)
+    assert [path.name for path in out.glob("*.*")] == (["anova.json"] if is_kept else [])
+    assert (f"Could not be removed, erase them: {out / 'anova.json'}." in err) == is_kept
+    assert ("Nothing of this run was kept." in err) != is_kept

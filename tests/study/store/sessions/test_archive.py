@@ -1,3 +1,5 @@
+import os
+
 import pytest
 
 from study.errors import StudyError, WrongUseError
@@ -107,3 +109,26 @@ def test_results_that_are_called_like_a_session_are_none(tmp_path):
     assert [folder.name for folder in list_session_folders(tmp_path)] == ["P01_001"]
     (tmp_path / "results_2026" / "events.jsonl").touch()  # an older version may have taken any code
     assert [folder.name for folder in list_session_folders(tmp_path)] == ["P01_001", "results_2026"]
+
+
+def test_a_session_is_found_from_within_its_folder(tmp_path, monkeypatch):
+    folder = create_session_folder(tmp_path, "P01")
+    folder.log.touch()
+    monkeypatch.chdir(folder.path)
+    for data in (tmp_path, tmp_path.parent):
+        assert find_session(".", data).path == folder.path
+
+
+def test_a_withdrawal_that_ends_while_it_is_looked_for_is_seen(tmp_path, monkeypatch):
+    folder, exists = create_session_folder(tmp_path, "P01"), os.path.exists
+    folder.withdrawal.write_text("{}")
+
+    def end_withdrawal(path):
+        found = exists(path)
+        folder.tombstone.write_text("{}")
+        folder.withdrawal.unlink(missing_ok=True)
+        return found
+
+    with monkeypatch.context() as ending:
+        ending.setattr(os.path, "exists", end_withdrawal)
+        assert folder.withdrawn

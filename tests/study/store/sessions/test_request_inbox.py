@@ -208,3 +208,15 @@ def test_a_note_that_no_session_would_read_is_refused(inbox, folder):
     assert list(folder.iterdir()) == []
     inbox.send(NoteAsked("experimenter", "麻" * 10_000))
     assert len(inbox.take()) == 1
+
+
+def test_only_the_note_that_is_in_the_log_is_forgotten(tmp_path, inbox):
+    """Another one may have been taken and lost, where the disk was full or the program was interrupted."""
+    later = NoteAsked("experimenter", "a later one")
+    for note in (NOTE, later, later):
+        inbox.send(note)
+    assert len(inbox.take()) == 3
+    inbox.forget_logged(later)
+    again = RequestInbox(tmp_path)
+    again.clear()
+    assert again.take() == (NOTE, later)

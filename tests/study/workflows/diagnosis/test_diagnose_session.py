@@ -12,7 +12,9 @@ from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
 from study.store.sessions.archive import SessionFolder
+from study.store.sessions.written_elsewhere import read_written_folders
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
+from study.workflows.diagnosis.write_diagnosis import note_sessions
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import make_simulated_participant
@@ -69,3 +71,12 @@ def test_a_diagnosis_that_was_under_way_during_a_withdrawal_leaves_nothing(sessi
     with pytest.raises(StudyError, match="withdrew"):
         diagnose_recordings(plan, lambda what, share: None, withdraw_meanwhile)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_diagnosis_of_recordings_in_a_session_is_noted_in_its_data_folder(tmp_path):
+    data, out = tmp_path / "data", tmp_path / "out"
+    (data / "P01_001").mkdir(parents=True)
+    (data / "P01_001" / "events.jsonl").touch()
+    recordings = [data / "P01_001" / "recordings" / name for name in ("1.h5", "2.h5")]
+    assert note_sessions((*recordings, tmp_path / "other.h5"), out) == (SessionFolder(data / "P01_001"),)
+    assert read_written_folders(data) == (out,)

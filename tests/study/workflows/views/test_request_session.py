@@ -16,6 +16,7 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, read_log
 from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
+from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.send_request import send_request
@@ -172,3 +173,19 @@ def test_a_note_that_the_session_did_not_hear_before_its_end_is_written_into_its
     assert [event.text for event in read_log(folder.log).events[-2:]] == ["an earlier one", NOTE.text]
     assert RequestInbox(folder.path).take() == ()
     assert validate_file(folder.path).problems == ()
+
+
+def test_a_note_that_was_sent_is_not_said_to_be_lost_where_it_cannot_be_written_yet(whole, monkeypatch):
+    def end_unheard(folder, note, clock):
+        RequestInbox(folder.path).send(note)
+        session.__exit__()
+        return False
+
+    monkeypatch.setattr("study.workflows.views.take_note.send_request", end_unheard)
+    session = Session(whole, hears=False)
+    session.__enter__()
+    with hold_session_lock(whole.path), pytest.raises(StudyError, match="running elsewhere") as told:
+        take_note(whole, NOTE, RealClock())
+    assert told.value.saved == "The note is kept in the session's folder, and need not be written again."
+    assert take_note(whole, replace(NOTE, text="another"), RealClock())
+    assert [event.text for event in read_log(whole.log).events[-2:]] == [NOTE.text, "another"]

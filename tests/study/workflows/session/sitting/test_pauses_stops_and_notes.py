@@ -16,7 +16,7 @@ from study.session.views.form_views import FormKind
 from study.session.views.participant_views import AfterPause
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.event_log import EventLog
+from study.store.sessions.event_log import EventLog, read_log
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from tests.study.workflows.session.sitting.person import Person, of
@@ -190,3 +190,59 @@ def test_a_note_is_in_the_log_however_the_sitting_ends(plan, small_protocol, sea
     with pytest.raises(StudyError):
         conduct_new(plan(small_protocol), "simulated", seat)
     assert "pain in a finger" in SessionFolder(tmp_path / "data" / "P01_001").log.read_text()
+
+
+def test_notes_come_once_each_where_the_disk_was_full_for_a_moment(plan, small_protocol, seat, person, monkeypatch):
+    append, folder = EventLog.append, SessionFolder(plan(small_protocol).data_folder / "P01_001")
+
+    def fill_disk(log, event):
+        if isinstance(event, NoteTaken) and event.text == "second":
+            monkeypatch.setattr(EventLog, "append", append)
+            RequestInbox(folder.path).send(NoteAsked("experimenter", "fourth"))
+            raise StudyError("The session cannot be written to disk", "The disk is full.", "Make room.")
+        append(log, event)
+
+    def note(question):
+        for text in ("first", "second", "third"):
+            RequestInbox(folder.path).send(NoteAsked("experimenter", text))
+        monkeypatch.setattr(EventLog, "append", fill_disk)
+
+    person.at_question = note
+    with pytest.raises(StudyError, match="The disk is full"):
+        conduct_new(plan(small_protocol), "simulated", seat)
+    again = Person(seat.clock)
+    resumed = conduct_resumed(folder, "simulated", Participant(display=again, hand=again, clock=seat.clock))
+    assert [note.text for note in of(resumed, NoteTaken)] == ["first", "fourth", "second", "third"]
+    assert list((folder.path / "requests").iterdir()) == []
+
+
+@pytest.mark.parametrize("closed", [OSError(5, "Input/output error"), KeyboardInterrupt()])
+def test_a_screen_that_was_closed_does_not_hide_an_interruption(
+    plan, small_protocol, seat, person, tmp_path, monkeypatch, closed
+):
+    """A step of the clock, such as after sleep, is shown when a note is logged."""
+
+    def report(steps, sitting):
+        raise closed
+
+    def interrupt(question):
+        seat.requests.send(NoteAsked("experimenter", "pale"))
+        monkeypatch.setattr("study.workflows.trial.sitting.report_clock_steps", report)
+        raise KeyboardInterrupt
+
+    person.at_question = interrupt
+    with pytest.raises(UserInterruptError, match="The force was released"):
+        conduct_new(plan(small_protocol), "simulated", seat)
+    note, interrupted = read_log(tmp_path / "data" / "P01_001" / "events.jsonl").events[-2:]
+    assert (note.text, interrupted.event) == ("pale", "session_interrupted")
+
+
+def test_a_note_is_logged_where_ctrl_c_comes_after_the_session_was_closed(plan, small_protocol, seat, monkeypatch):
+    def interrupt(log):
+        seat.requests.send(NoteAsked("experimenter", "a rash", adverse=True))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("study.workflows.session.run_session.seal_log", interrupt)
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert end.state.closed
+    assert [note.text for note in of(end, NoteTaken)] == ["a rash"]

@@ -224,3 +224,17 @@ def test_a_folder_that_cannot_be_looked_into_does_not_keep_a_withdrawal_from_goi
     plan = plan_withdrawal(SessionFolder(data / "P01_001"))
     assert plan.doubtful == ("lost+found cannot be looked into: Permission denied.",)
     assert list_remaining_copies(data, plan)[0] == f"Written with --out, and not erased: {tmp_path / 'out' / 'a'}"
+
+
+def test_a_session_that_was_begun_after_the_question_and_runs_stops_the_withdrawal(data):
+    plan, before = plan_withdrawal(SessionFolder(data / "P01_001")), files(data / "P01_001")
+    copy_session(data, "P01_003")
+    log = EventLog.reopen(data / "P01_003" / "events.jsonl")
+    with pytest.raises(StudyError, match="Another program is writing to P01_003") as told:
+        withdraw(data, plan, UTC)
+    assert told.value.saved == "Nothing was erased now, but no session of P01 counts as data any more."
+    assert before.items() <= files(data / "P01_001").items()
+    assert SessionFolder(data / "P01_001").withdrawn
+    log.close()
+    erase(data)
+    assert not (data / "P01_003" / "events.jsonl").exists()
