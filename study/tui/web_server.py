@@ -17,7 +17,7 @@ import secrets
 import shlex
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 
-from aiohttp import WSCloseCode, web
+from aiohttp import web
 from rich.console import Console
 from textual_serve.app_service import AppService
 from textual_serve.server import Server, to_int
@@ -26,9 +26,11 @@ RELOAD_TIMEOUT_S = 10.0
 """Longest time (s) for which a reloaded page waits until the application of the previous page has ended. Chosen: longer
 than the end of an application usually takes; after it, another window is assumed to be open."""
 
-HEARTBEAT_S = 4.0
-"""Time (s) after which a silent browser is asked for a sign of life; half of it later it counts as gone, which ends the
-application and its force. Chosen: longer than a network or a busy computer stalls."""
+SILENCE_S = 6.0
+"""Time (s) after which a silent browser counts as gone, which ends the application and its force. Chosen: longer than a
+network or a busy computer stalls."""
+PING_S = 2.0
+"""Time (s) between two requests for a sign of life; a connection may stall for `SILENCE_S` less this time."""
 
 LOCAL_HOST_NAMES = ("localhost", "127.0.0.1", "[::1]")
 """Names by which a browser may address this machine."""
@@ -85,7 +87,7 @@ class ScreenServer(Server):
     async def _run_application(self, request: web.Request) -> web.WebSocketResponse:
         """Run the application until it or the connection ends, as `Server.handle_websocket` does, whose heartbeat of
         15 s would leave a force on for 23 s after the browser's machine fell silent."""
-        websocket = web.WebSocketResponse(heartbeat=HEARTBEAT_S)
+        websocket = web.WebSocketResponse(receive_timeout=SILENCE_S)
         await websocket.prepare(request)
 
         async def send_output(output: bytes) -> None:
@@ -106,16 +108,19 @@ class ScreenServer(Server):
             download_manager=self.download_manager,
             debug=self.debug,
         )
+        ping_task = asyncio.create_task(_send_pings(websocket))
         try:
             await application.start(
                 to_int(request.query.get("width", ""), 80), to_int(request.query.get("height", ""), 24)
             )
             await self._process_messages(websocket, application)
+        except TimeoutError:
+            if request.transport is not None:
+                request.transport.abort()  # output that a silent browser does not take would be waited for
         except Exception:
             logging.getLogger(__name__).exception("The connection of the page failed")
         finally:
-            if websocket.close_code == WSCloseCode.ABNORMAL_CLOSURE and request.transport is not None:
-                request.transport.abort()  # output that a silent browser does not take would be waited for
+            ping_task.cancel()
             await application.stop()
         return websocket
 
@@ -196,6 +201,14 @@ class ScreenServer(Server):
             "Referrer-Policy": "no-referrer",
             "Cache-Control": "no-store",
         }
+
+
+async def _send_pings(websocket: web.WebSocketResponse) -> None:
+    """Request a sign of life from the browser every `PING_S` (s), until the connection is closed."""
+    with contextlib.suppress(ConnectionError):
+        while True:
+            await asyncio.sleep(PING_S)
+            await websocket.ping()
 
 
 def list_origins(host: str, port: int) -> frozenset[str]:

@@ -117,8 +117,10 @@ def read_lab_settings() -> LabSettings:
 def _parse_settings(text: str) -> LabSettings:
     """Parse the text of the settings file. Numbers must be numbers, not text or truth values. Raises ValidationError,
     and ValueError or RecursionError for a text that is not TOML."""
-    # Validated as JSON, like a protocol (`protocols.document.loading`): strict, and yet a list may stand for a tuple.
-    return TypeAdapter(LabSettings).validate_json(json.dumps(tomllib.loads(text), default=str), strict=True)
+    # Validated as JSON, like a protocol (`protocols.document.loading`): strict, and yet a list may stand for a tuple. A
+    # date or time, which JSON lacks, becomes an empty object, which is neither a number nor a text.
+    values_json = json.dumps(tomllib.loads(text), default=lambda _date: {})
+    return TypeAdapter(LabSettings).validate_json(values_json, strict=True)
 
 
 def write_sensor_table(sensor_table: str) -> Path:

@@ -19,7 +19,7 @@ pytest.importorskip("textual_serve")
 
 from aiohttp import ClientSession, WSServerHandshakeError
 
-from study.tui.web_server import HEARTBEAT_S, list_origins
+from study.tui.web_server import SILENCE_S, list_origins
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -279,7 +279,7 @@ def test_a_browser_that_falls_silent_counts_as_gone_within_seconds(server):
                         gone_after_s = time.monotonic() - silent_since_s
         return gone_after_s
 
-    assert in_browser(server, visit) < 3 * HEARTBEAT_S
+    assert in_browser(server, visit) < 2 * SILENCE_S
 
 
 def test_our_page_has_the_names_that_a_browser_gives_it():

@@ -1,16 +1,15 @@
-"""A browser that falls silent while the application writes: the application ends, and only then may another begin."""
+"""A browser that falls silent while the application writes: the application ends, and only then may another begin. One
+that answers late remains."""
 
 import asyncio
-import contextlib
 import socket
 import sys
-import time
 
 import pytest
 
 pytest.importorskip("textual_serve")
 
-from aiohttp import ClientSession, WSServerHandshakeError, web
+from aiohttp import ClientSession, WSMsgType, web
 
 from study.tui import web_server
 
@@ -33,31 +32,53 @@ pathlib.Path(sys.argv[2]).touch()
 """
 
 
-async def wait_for_another_window(command, port):
-    """Time (s) from the silence of a first window until a second one is let in."""
-    server = web_server.ScreenServer(command, "localhost", port, print_line=lambda _: None)
+@pytest.fixture
+def port():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+async def visit_in_a_window(port, program, visit):
+    """visit(server, window): a coroutine with a window, open and drawn, that answers no ping by itself."""
+    server = web_server.ScreenServer([sys.executable, "-c", *program], "localhost", port, print_line=lambda _: None)
     runner = web.AppRunner(await server._make_app())
     await runner.setup()
     await web.TCPSite(runner, "localhost", port).start()
     url, origin = f"http://localhost:{port}/{server._token}/ws", f"http://localhost:{port}"
-    async with ClientSession() as session, session.ws_connect(url, origin=origin, autoping=False) as first:
-        await first.receive(timeout=30)
-        silent_since_s = time.monotonic()
-        while time.monotonic() < silent_since_s + 20:
-            with contextlib.suppress(WSServerHandshakeError):  # refused while the first counts as open
-                async with session.ws_connect(url, origin=origin):
-                    return time.monotonic() - silent_since_s
-    pytest.fail("the first window counts as open for ever")
+    async with ClientSession() as session, session.ws_connect(url, origin=origin, autoping=False) as window:
+        await window.receive(timeout=30)
+        await visit(server, window)
+    await runner.cleanup()
 
 
 @pytest.mark.parametrize("packet_bytes", [100, 500_000], ids=["few words", "more than the connection holds"])
-def test_another_window_waits_until_the_application_of_a_silent_browser_has_ended(tmp_path, monkeypatch, packet_bytes):
-    monkeypatch.setattr(web_server, "HEARTBEAT_S", 1.0)
-    monkeypatch.setattr(web_server, "RELOAD_TIMEOUT_S", 2.0)
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+def test_another_window_waits_until_the_application_of_a_silent_browser_has_ended(
+    tmp_path, monkeypatch, port, packet_bytes
+):
+    async def wait_for_another_window(server, _):
+        async with asyncio.timeout(20):
+            await server._window_lock.acquire()
+
+    monkeypatch.setattr(web_server, "SILENCE_S", 1.0)
     ended = tmp_path / "ended"
-    command = [sys.executable, "-c", APP, str(packet_bytes), str(ended)]
-    assert asyncio.run(wait_for_another_window(command, port)) < 10
+    asyncio.run(visit_in_a_window(port, (APP, str(packet_bytes), str(ended)), wait_for_another_window))
     assert ended.exists()
+
+
+def test_a_browser_whose_answers_are_late_is_not_gone(tmp_path, monkeypatch, port):
+    """As over a network that stalls: each answer comes after more than half of the accepted silence."""
+
+    async def answer_late(_, window):
+        answers = 0
+        while answers < 4:
+            message = await window.receive(timeout=30)
+            assert message.type in (WSMsgType.PING, WSMsgType.BINARY)
+            if message.type is WSMsgType.PING:
+                await asyncio.sleep(0.6 * web_server.SILENCE_S)
+                await window.pong(message.data)
+                answers += 1
+
+    monkeypatch.setattr(web_server, "SILENCE_S", 1.5)
+    monkeypatch.setattr(web_server, "PING_S", 0.3)
+    asyncio.run(visit_in_a_window(port, (APP, "10", str(tmp_path / "ended")), answer_late))

@@ -96,6 +96,7 @@ UNUSABLE = {
     "Exceeds the limit": f"effective_mass_kg = {'9' * 5000}",
     "recursion": f"effective_mass_kg = {'[' * 5000}{']' * 5000}",
     "accelerometer.baud: Input should be a valid integer": f"{SENSOR}baud = true",
+    "accelerometer.port: Input should be a valid string": SENSOR.replace('"/dev/ttyACM0"', "12:00:00"),
     "sensitivity has a row or column that follows": SENSOR.replace("[6.0, 1.0, 598.0]", "[1214.0, 6.0, -10.0]"),
     "raw_range must be the lowest": SENSOR.replace("[13800, 51200]", "[51200, 13800]"),
 }
@@ -114,3 +115,10 @@ def test_a_port_of_any_name_is_written_so_that_it_is_read_again(file, port):
     write_sensor_table(format_calibration_toml(IDEAL, port, 115_200))
     lab = read_lab_settings()
     assert lab.accelerometer is not None and lab.accelerometer.port == port
+
+
+@pytest.mark.parametrize(("text", "mass_kg"), [("1", 1.0), ("15_3e-2", 1.53), ("0x1", 1.0)])
+def test_a_number_in_any_notation_of_toml_is_read(file, text, mass_kg):
+    file.parent.mkdir()
+    file.write_text(f"effector_mass_kg = {text}")
+    assert read_lab_settings().effector_mass_kg == mass_kg
