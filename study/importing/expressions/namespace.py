@@ -93,11 +93,13 @@ class Namespace:
 
     def _resolve_name(self, name: str) -> str:
         """Find the name of an array or a definition that is written with other code points for the same letters: the
-        parser changes `µ` (U+00B5) in an expression to the Greek letter. Unchanged without such a name."""
+        parser changes `µ` (U+00B5) in an expression to the Greek letter. `x2` is not `x²`, which is no identifier.
+        Unchanged without such a name."""
         if self.has_name(name):
             return name
         normal_form = unicodedata.normalize("NFKC", name)
-        known_names = (*self.arrays, *self.definitions)
+        is_identifier = name.isidentifier()
+        known_names = (known for known in (*self.arrays, *self.definitions) if known.isidentifier() == is_identifier)
         return next((known for known in known_names if unicodedata.normalize("NFKC", known) == normal_form), name)
 
     def list_names(self) -> str:

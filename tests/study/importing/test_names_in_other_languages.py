@@ -9,7 +9,7 @@ from study.importing.arrays.read_arrays import Arrays
 from study.importing.header_map import find_header_problems, make_header_map
 from study.importing.map_format.signal_words import parse_signal_name
 from study.importing.map_skeleton import make_map_skeleton
-from tests.recording_maps import U, Y, built, map_text
+from tests.recording_maps import U, Y, built, map_text, refusal
 
 
 def arrays(tmp_path, *names):
@@ -65,6 +65,11 @@ def test_the_same_letters_of_other_code_points_are_the_same_name(files, header, 
     text = map_text().replace('value = "y"', f'value = "{expression}"')
     found = built(text, files(**{"u": U, header: Y})).recording
     np.testing.assert_allclose(found.response.samples[:, 0], (2 if "2" in expression else 1) * 9.80665 * Y)
+
+
+def test_a_digit_is_not_the_exponent_of_the_same_number(files):
+    text = map_text().replace('value = "y"', 'value = "x2"')
+    assert "there is no array 'x2' in a.npz" in refusal(text, files(**{"u": U, "x²": Y}))
 
 
 @pytest.mark.parametrize("name", ["𝜔", "Größe", "line\nrole = 'break'", "delete\x7f", 'say "no"', "back\\slash"])
