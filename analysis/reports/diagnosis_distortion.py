@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from analysis.diagnosis.limits import DISTORTION_P
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
 from analysis.diagnosis.localisation.level_trends import LevelTrend, compute_level_trends
@@ -128,8 +130,8 @@ def _collect_noise_rms(findings: Findings) -> dict[tuple[str, str], float]:
 
 
 def _format_share_of_signal(rms: float | None, signal_rms: float) -> str:
-    """Format an rms as a share of the signal's; `MISSING` without an rms or a signal."""
-    return MISSING if rms is None or not signal_rms > 0 else format_share(rms / signal_rms)
+    """Format an rms as a share of the signal's; `MISSING` where it is unknown (None or NaN), or without a signal."""
+    return MISSING if rms is None or not np.isfinite(rms) or not signal_rms > 0 else format_share(rms / signal_rms)
 
 
 def _format_distortion(cell: Distortion | None) -> str:

@@ -293,8 +293,8 @@ def _make_response_action(law: Law, channels: Channels) -> OnResponse:
 
 
 def _index_response_signals(channels: Channels) -> Mapping[str, int]:
-    """List the column in the response of each name that a formula can use."""
+    """List the column in the response of each name in a formula; a channel's own name counts, as in older files."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     letters = derive_axis_letters(channels.outputs) if order is not None else ()
     derivative_names = {DERIVATIVE_PREFIXES[order or 0] + letter: column for column, letter in enumerate(letters)}
-    return derivative_names | {name: column for column, name in enumerate(channels.outputs)} | derivative_names
+    return derivative_names | {name: column for column, name in enumerate(channels.outputs)}

@@ -80,16 +80,22 @@ def find_law_letter(law: Law, channels: tuple[str, ...]) -> str:
     letter_by_channel = dict(zip(channels, derive_axis_letters(channels), strict=False))
     if law.axis in letter_by_channel:
         return letter_by_channel[law.axis]
-    prefixes = (*DERIVATIVE_PREFIXES, COMMAND_PREFIX)
-    used_letters = [letter for letter in AXIS_LETTERS if any(prefix + letter in law.variables for prefix in prefixes)]
-    own_letter = law.axis[-1:]
+    used_letters, own_letter = _list_used_letters(law), law.axis[-1:]
     return own_letter if own_letter in AXIS_LETTERS or len(used_letters) != 1 else used_letters[0]
+
+
+def _list_used_letters(law: Law) -> list[str]:
+    """List the letters of the axes whose signals the formula contains."""
+    prefixes = (*DERIVATIVE_PREFIXES, COMMAND_PREFIX)
+    return [letter for letter in AXIS_LETTERS if any(prefix + letter in law.variables for prefix in prefixes)]
 
 
 def _permute_to_axis(law: Law, channels: tuple[str, ...], site: int) -> Law:
     """Permute the letters in the formula cyclically, so that the axis of the law becomes that with index `site` among
     the channels. If the new recording lacks the letter of the law's axis, it counts as that of the first axis."""
-    law_letter, axis_letters = find_law_letter(law, channels), derive_axis_letters(channels)
+    axis_letters = derive_axis_letters(channels)
+    # A formula of its axis's letter alone: in the device of the law, that letter was no channel of another axis.
+    law_letter = law.axis if _list_used_letters(law) == [law.axis] else find_law_letter(law, channels)
     letter_index = axis_letters.index(law_letter) if law_letter in axis_letters else 0
     new_letters = {
         letter: axis_letters[(index + site - letter_index) % len(axis_letters)]

@@ -90,8 +90,8 @@ def _format_names_sentence(signal: Signal, quantities: Sequence[str]) -> str:
     """Format a sentence on the quantities that were taken from names, with the way to correct them."""
     phrases = [
         f"{name} was taken for {'an' if quantity.startswith('a') else 'a'} {quantity}"
-        for name, quantity in zip(signal.channels, quantities, strict=True)
-        if quantity in BALANCE_QUANTITIES
+        for name, quantity, stated in zip(signal.channels, quantities, signal.quantities, strict=True)
+        if quantity != stated
     ]
     return f"From the name alone, {conjoin(phrases)}; if it is another quantity, state that in the map (quantity)."
 

@@ -47,6 +47,10 @@ MIN_SPEED_AMPLITUDE_MPS = 1e-9
 """Least velocity amplitude (m/s) in the identification, assumed for an axis that did not move: keeps the describing
 function finite."""
 
+ROTATION_TOLERANCE = 1e-3
+"""Largest deviation of an output matrix from a rotation at which it counts as one, because cosines in a model file are
+rounded; the motion is then wrong by no more. Chosen."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compensation:
@@ -125,8 +129,8 @@ def compute_channels_to_axes(physics: MechanicalModel, axis_count: int) -> Float
     signs = np.where(np.diagonal(channel_gains)[:axis_count] < 0, -1.0, 1.0)
     is_rotation = (
         channel_gains.shape == (axis_count, axis_count)
-        and np.allclose(channel_gains @ channel_gains.T, np.eye(axis_count))
-        and np.allclose(channel_gains @ driven_axes.T, physics.output)
+        and np.allclose(channel_gains @ channel_gains.T, np.eye(axis_count), atol=ROTATION_TOLERANCE)
+        and np.allclose(channel_gains @ driven_axes.T, physics.output, atol=ROTATION_TOLERANCE)
     )
     return np.asarray(channel_gains if is_rotation else np.diag(signs))
 

@@ -14,10 +14,11 @@ from equalizer.effects.discovered_law import (
     Channels,
     get_law_values,
     index_force_signals,
+    list_response_signals,
     make_law_effect,
     make_law_parameters,
 )
-from equalizer.effects.effect import OnCommand, PlacedEffect
+from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect
 from equalizer.effects.simulation.forces_along_motion import compute_effect_forces_along_motion
 from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -227,3 +228,14 @@ def test_a_channel_named_as_another_signal_does_not_replace_that_signal():
     assert action.of_all is not None
     commands = np.array([[1.0, 5.0], [1.0, 5.0]])
     assert action.of_all(commands, 0, 1e-3, get_law_values(law))[0] == pytest.approx([2.0, 2.0])
+
+
+def test_a_law_of_the_response_reads_the_channel_that_it_names():
+    """In a file, `x` is the reading of a second channel called x, not that of the first axis."""
+    channels = Channels(("m1", "m2"), ("theta", "x"), "position")
+    assert list_response_signals(channels) == ("theta", "x")
+    law = parse_law("x + 0.5*x**3", "response", "x")
+    action = make_law_effect(law, channels).action
+    assert isinstance(action, OnResponse)
+    readings = np.array([[1.0, 2.0], [1.0, 4.0]])
+    assert action.change(readings, 100.0, (1,), get_law_values(law)) == pytest.approx(np.array([[1, 6.0], [1, 36.0]]))

@@ -72,3 +72,10 @@ def test_a_law_moves_with_its_axis_where_channels_are_not_named_by_letters(axis,
     entry = LawEntry("drag", parse_law("-8.0*vy**3", "force", axis), "found", "varies")
     effects = make_effects_per_axis(entry, Channels(channels, ("s1", "s2")))
     assert [effect.law.text for effect in effects] == ["-8.0*vx**3", "-8.0*vy**3"]
+
+
+def test_the_letter_of_a_law_is_not_taken_for_a_channel_of_another_axis():
+    """A law of another device's axis x, in a device whose second axis (y in a formula) has a channel called x."""
+    entry = LawEntry("drag", parse_law("-8.0*vx**3", "force", "x"), "found", "varies")
+    effects = make_effects_per_axis(entry, Channels(("theta", "x"), ("s1", "s2")))
+    assert [effect.law.text for effect in effects] == ["-8.0*vx**3", "-8.0*vy**3"]

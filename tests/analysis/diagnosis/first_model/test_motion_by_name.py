@@ -57,3 +57,10 @@ def test_a_command_in_counts_is_the_imposed_motion_that_its_name_says_where_forc
     assert found.command.quantities == (quantity,)
     assert found.response.quantities == ("force",)
     assert said.startswith(f"From the name alone, {name} was taken for a position") == (quantity == "position")
+
+
+def test_of_several_commands_only_the_quantity_that_was_not_stated_is_said_to_be_from_a_name():
+    commands = [("x", "position", "m", PLACE), ("encoder", *PLAIN, PLACE), ("drive", "force", "N", PUSH)]
+    (found,), said = infer_quantities((make_recording(commands, [("load", "force", "N", PUSH)]),))
+    assert found.command.quantities == ("position", "position", "force")
+    assert said.startswith("From the name alone, encoder was taken for a position;")

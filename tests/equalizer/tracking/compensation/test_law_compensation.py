@@ -195,6 +195,15 @@ def test_the_motion_of_a_turned_sensor_is_turned_back_to_the_axes(text, identifi
     assert by_sensor == pytest.approx(along_axes, abs=1e-9)
 
 
+def test_the_cosines_of_a_turned_sensor_may_be_rounded():
+    straight, cosine = physics(found("-5.0*vy*abs(vy) - 30.0*y")), np.sqrt(0.5)
+    along_axes = compensate(PUSHED, WANTED, MODEL, straight, None).forces
+    exact = np.array([[cosine, cosine, 0.0], [-cosine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    turned = replace(straight, output=exact.round(3))
+    by_sensor = compensate(PUSHED, WANTED @ exact.T, MODEL, turned, None).forces
+    assert np.abs(by_sensor - along_axes).max() < 1e-3 * np.abs(along_axes - PUSHED).max()
+
+
 def test_an_axis_is_found_by_its_command_where_responses_have_another_order():
     effect = found("-5.0*vy")
     assert find_effect_axes(effect, ("fx", "fy"), ("ay", "ax")) == (1,)
