@@ -65,9 +65,10 @@ def _solve_least_squares(phi: FloatArray, y: FloatArray) -> FloatArray:
     return solution
 
 
-FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
-"""Damping of the first step, and the damping above which the search ends, because no step lowers the cost; relative to
-the diagonal of J'J. Chosen."""
+FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-14, 1e12
+"""Damping of the first step, least damping, and the damping above which the search ends, because no step lowers the
+cost; relative to the diagonal of J'J. Chosen; the least is above the rounding errors of J'J, which alone is singular:
+the scale of a state is free in C, because B absorbs it."""
 
 LEAST_COST_DECREASE = 1e-7
 """Relative decrease of the cost in a step below which the search ends. Chosen."""
@@ -130,6 +131,7 @@ def refine_form(form: ModalForm, lines: WeightedLines, radius: Radius, max_steps
         damping *= (
             max(1 / 3, 1 - (2 * min(decrease / expected_decrease, 1.5) - 1) ** 3) if expected_decrease > 0 else 1.0
         )
+        damping = max(damping, LEAST_DAMPING)
         damping_factor = 2.0
         is_converged = decrease < LEAST_COST_DECREASE * current_fit.cost
         current_fit = trial_fit

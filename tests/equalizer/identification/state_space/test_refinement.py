@@ -7,7 +7,13 @@ import pytest
 from scipy.optimize import least_squares
 
 from equalizer.identification.state_space.modal_form import ModalForm
-from equalizer.identification.state_space.refinement import complete_form, refine_form, solve_input_matrices
+from equalizer.identification.state_space.refinement import (
+    LEAST_DAMPING,
+    _compute_step,
+    complete_form,
+    refine_form,
+    solve_input_matrices,
+)
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.identification.state_space.weighted_lines import weight_lines
 from tests.equalizer.identification.state_space.test_modal_form import make_modal_form
@@ -98,3 +104,11 @@ def test_states_that_nothing_shows_do_not_stop_the_search(plant, lines):
     found = refine_form(twice, lines, RADIUS)
     assert np.isfinite(found.B).all()
     assert lines.compute_cost(found.compute_response(lines.z)) / lines.response.size < 1.05
+
+
+def test_the_least_damping_gives_a_step_where_the_data_leave_a_scale_free():
+    normal_matrix, gradient = np.full((2, 2), 2.0), np.array([1.0, 1.0])
+    with pytest.raises(np.linalg.LinAlgError):
+        _compute_step(normal_matrix, gradient, 1e-17)
+    step = _compute_step(normal_matrix, gradient, LEAST_DAMPING)
+    assert normal_matrix @ step == pytest.approx(-gradient, rel=1e-2)
