@@ -44,7 +44,8 @@ def describe_session(session: SessionLine) -> str:
             progress_text = (
                 f"{session.runs_done} of {_format_run_count(session.runs)} done, {_format_answer_count(session)}"
             )
-            return f"{_format_session_name(session)} is not finished: {progress_text}. It can be resumed."
+            device_text = f" on the {session.device}" if session.device else ""
+            return f"{_format_session_name(session)} is not finished: {progress_text}. It can be resumed{device_text}."
         case "running":
             return f"{_format_session_name(session)} is running now in another program. You can watch it."
         case "refused" | "excluded":

@@ -238,3 +238,38 @@ def test_a_pause_can_end_the_sitting(persons_seat):
 def test_consent_can_be_taken_back_during_a_pause(persons_seat):
     persons_seat.withdraw()
     assert persons_seat.display.pause(PAUSE, lambda: True) is AfterPause.WITHDRAW
+
+
+class StopRequestedError(Exception):
+    """Raised by the function that listens for requests."""
+
+
+NOTICES: dict[str, Callable[..., object]] = {
+    "a form": lambda display: display.fill_in(FORM),
+    "a device check": lambda display: display.device_checked(REPORT),
+    "instructions": lambda display: display.welcome(WELCOME),
+    "a practice": lambda display: display.practice_over(PracticeResult(True, correct_count=4, answer_count=5)),
+    "a void trial": lambda display: display.await_return("the stimulus was held too long"),
+}
+
+
+@pytest.mark.parametrize("notice", NOTICES)
+def test_a_form_and_each_notice_listen_while_they_wait_and_can_be_ended(persons_seat, notice):
+    heard_s: list[float] = []
+
+    def listen() -> None:
+        heard_s.append(persons_seat.clock.now_s())
+        if len(heard_s) == 4:
+            raise StopRequestedError
+
+    persons_seat.display.listen_with(listen)
+    with pytest.raises(StopRequestedError):
+        NOTICES[notice](persons_seat.display)
+    assert heard_s[-1] - heard_s[0] < 1.0
+
+
+def test_the_words_of_a_withdrawal_are_waited_for_also_where_a_stop_comes(persons_seat):
+    persons_seat.withdraw()
+    signs = Signs(over_after=1)
+    assert persons_seat.display.pause(PAUSE, signs) is AfterPause.WITHDRAW
+    assert signs.count >= 2

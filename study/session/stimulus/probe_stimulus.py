@@ -12,13 +12,9 @@ from equalizer.signals.excitation import apply_fades
 from equalizer.signals.multisine import list_lines_between, make_interleaved_multisine
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
-from protocols.definition.probes import LOWEST_LINE_HZ, PERIOD_S, ProbeSettings
+from protocols.definition.probes import FADE_S, LOWEST_LINE_HZ, PERIOD_S, ProbeSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
-FADE_S = 0.25
-"""Duration of the raised-cosine fade at both ends (s). Chosen: long enough that the onset excites few modes."""
-PROBE_HOLD_S = FADE_S + PERIOD_S + 0.1
-"""Time from the start of a probe to its fade-out (s): fade-in, one whole period, and a margin of 0.1 s (chosen)."""
 PHASE_SEED = 16
 """Seed of the phases, the same for every probe, so that probes can be compared line by line."""
 

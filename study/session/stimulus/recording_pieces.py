@@ -60,12 +60,14 @@ def make_pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Rec
     sequence: list[RecordingPiece] = []
     for number, segment in enumerate(protocol.segments, start=1):
         try:
+            if round(protocol.fade_s * sample_rate_hz) == 0:
+                raise ValueError(f"the fade of {protocol.fade_s:g} s is no more than half a tick: the force would jump")
             sequence += _make_segment_pieces(protocol, number, segment, sample_rate_hz)
         except ValueError as error:
             raise WrongUseError(
                 "This protocol cannot be recorded",
                 f"segments[{number}] of '{protocol.name}' at {sample_rate_hz:g} samples per second: {error}.",
-                "Change its frequencies or its duration, or take a device of a higher rate.",
+                "Change its frequencies, its duration or fade_s, or take a device of a higher rate.",
                 saved="Nothing moved.",
             ) from error
     return tuple(sequence) * protocol.repeats

@@ -21,6 +21,9 @@ from protocols.definition.apparatus import TestDirections
 from protocols.definition.study_protocol import StimulusSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
+MIN_SAMPLES_PER_PERIOD = 4
+"""Smallest number of samples in a period of a stimulus, as in `protocols.definition.field_types`."""
+
 PLANE_AXES = {"xy": (0, 1), "yz": (1, 2), "zx": (2, 0)}
 """Indices (x: 0, y: 1, z: 2) of a plane's first and second axis; an angle counts from the first towards the second."""
 
@@ -51,7 +54,7 @@ def compute_direction_angle_deg(directions: TestDirections, direction: int) -> f
 
 def count_loop_samples(frequency_hz: float, sample_rate_hz: float) -> int:
     """Count the samples of the shortest loop of whole periods: rate / gcd(rate, frequency), both rounded to multiples
-    of 0.1 Hz. Exact only for such multiples; protocols accept no others (`protocols.definition.field_types`)."""
+    of 0.1 Hz. Exact only for such multiples: protocols accept no other frequencies, a device may have another rate."""
     sample_rate_decihertz, frequency_decihertz = round(sample_rate_hz * 10), round(frequency_hz * 10)
     return sample_rate_decihertz // math.gcd(sample_rate_decihertz, frequency_decihertz)
 
@@ -76,7 +79,9 @@ def make_held_stimulus(
     equalizer takes a force, in m/s² where it takes an acceleration; its sign is the polarity. unit_vector: (3,),
     the direction."""
     loop_sample_count = count_loop_samples(frequency_hz, sample_rate_hz)
-    phase_rad = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(loop_sample_count)
+    # The frequency of whole periods in the loop: the force must not jump where the loop begins again.
+    played_hz = round(loop_sample_count * frequency_hz / sample_rate_hz) * sample_rate_hz / loop_sample_count
+    phase_rad = 2 * math.pi * played_hz / sample_rate_hz * np.arange(loop_sample_count)
     is_force = equalizer.reference_quantity == "force"
     target_signal = Signal(
         samples=amplitude * np.sin(phase_rad)[:, None] * unit_vector,

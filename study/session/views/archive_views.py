@@ -45,6 +45,8 @@ class SessionLine:
     standing: SessionStatus
     remark: str = ""
     """Note for the list, such as the reason why the session cannot be read."""
+    device: str = ""
+    """Name of the device on which the session was begun; empty for a withdrawn or unreadable session."""
 
 
 @dataclass(frozen=True, slots=True)

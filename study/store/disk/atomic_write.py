@@ -1,8 +1,11 @@
 """Atomic writes: a file appears under its final name complete and synced to disk, or not at all."""
 
+import errno
 import os
 import secrets
-from contextlib import suppress
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError, NotSyncedError
@@ -14,7 +17,7 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> 
     `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyExistsError if the file exists and is
     not to be replaced, CannotWriteError for an error of the operating system, NotSyncedError where the file is in place
     and only the sync of the folder failed. After an error the temporary file is removed."""
-    temporary_path = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    temporary_path = _name_temporary(path)
     try:
         if path.exists() and not overwrite:
             raise AlreadyExistsError(path)
@@ -30,6 +33,49 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> 
         with suppress(OSError):
             temporary_path.unlink(missing_ok=True)
     sync_entry(path)
+
+
+@contextmanager
+def reserve_space(path: Path, size_bytes: int) -> Iterator[None]:
+    """Context that keeps `size_bytes` (at least 1) of the disk free for `write_atomically(path, ...)` after it, in a
+    temporary file. Raises CannotWriteError before the body where they are not free, or no file can be made there. Where
+    the system reserves no space (macOS, Windows), the free space is only compared."""
+    temporary_path = _name_temporary(path)
+    descriptor = -1
+    try:
+        try:
+            descriptor = os.open(temporary_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, choose_file_mode(path.parent))
+            with suppress(OSError):  # without a name nothing remains of it, however the program ends (not on Windows)
+                temporary_path.unlink()
+            _allocate(descriptor, path.absolute().parent, size_bytes)
+        except OSError as problem:
+            raise CannotWriteError(path, problem) from problem
+        yield
+    finally:
+        if descriptor >= 0:
+            os.close(descriptor)
+        with suppress(OSError):
+            temporary_path.unlink(missing_ok=True)
+
+
+def _allocate(descriptor: int, folder: Path, size_bytes: int) -> None:
+    """Allocate `size_bytes` for an open file of the folder, or compare them with the free space where the system cannot
+    allocate. Raises OSError."""
+    if hasattr(os, "posix_fallocate"):
+        try:
+            os.posix_fallocate(descriptor, 0, size_bytes)
+        except OSError as problem:
+            if problem.errno not in (errno.EINVAL, errno.EOPNOTSUPP):
+                raise
+        else:
+            return
+    if shutil.disk_usage(folder).free < size_bytes:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _name_temporary(path: Path) -> Path:
+    """Make a new name for the temporary file that becomes `path`."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
 
 
 def sync_entry(path: Path) -> None:

@@ -56,7 +56,8 @@ LAYOUT = (
     Entry(
         "expected_error",
         "attribute, number",
-        "relative error of the model against the device; at least the misfit, scatter and held-out error",
+        "relative error of the model against the device; at least the misfit, scatter and held-out error; missing = "
+        "not known",
         False,
     ),
     Entry("misfit_error", "attribute, number", "relative error against the fitted lines, beyond their noise", False),
@@ -130,13 +131,13 @@ def _write_quality(file: Any, quality: ModelQuality) -> None:
 def _read_quality(file: Any) -> ModelQuality | None:
     """Read the quality of the model; None if the file states none (older files). A missing misfit error is taken as the
     expected error. Raises ValueError for an unusable attribute."""
-    if "expected_error" not in file.attrs:
+    if not {"expected_error", "misfit_error"} & set(file.attrs):
         return None
     numbers = {name: read_numbers_attribute(file, name, 1)[0] for name in QUALITY_NUMBER_NAMES if name in file.attrs}
     remarks = read_texts_attribute(file, "quality_remarks") if "quality_remarks" in file.attrs else ()
     return ModelQuality(
-        expected_error=numbers["expected_error"],
-        misfit_error=numbers.get("misfit_error", numbers["expected_error"]),
+        expected_error=numbers.get("expected_error"),
+        misfit_error=numbers["misfit_error" if "misfit_error" in numbers else "expected_error"],
         scatter_error=numbers.get("scatter_error"),
         held_out_error=numbers.get("held_out_error"),
         held_out_noise=numbers.get("held_out_noise"),

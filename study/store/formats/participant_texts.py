@@ -10,6 +10,7 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
+from protocols.definition.new_use import find_new_use_problems
 from protocols.definition.problem import Problem
 from protocols.document.dumping import dump_protocol
 from protocols.document.loading import Protocol, ProtocolError, load_protocol, protocol_from_values
@@ -56,12 +57,21 @@ def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[
 
 
 def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Protocol, str]:
-    """Load a protocol and fill in the participants' texts of its language. Returns the protocol and its TOML text:
+    """Load a protocol file and fill in the participants' texts of its language. Returns the protocol and its TOML text:
     `text` itself where no texts had to be filled in.
 
     text: content of the protocol file; source: its name for messages; folder: that of the file, None for a shipped
-    protocol. Raises ProtocolError (invalid protocol, unknown language or text), CannotReadError, UnusableFileError.
+    protocol. Raises ProtocolError (invalid protocol, refused for new use, unknown language or text), CannotReadError,
+    UnusableFileError.
     """
+    protocol, protocol_text = _fill_in_texts(text, source, folder)
+    if problems := find_new_use_problems(protocol):
+        raise ProtocolError(source, problems)
+    return protocol, protocol_text
+
+
+def _fill_in_texts(text: str, source: str, folder: Path | None) -> tuple[Protocol, str]:
+    """Load a protocol with the texts of its language. Arguments, result and errors as of `load_in_language`."""
     try:
         values = tomllib.loads(text)
     except (ValueError, RecursionError):

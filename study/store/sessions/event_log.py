@@ -74,9 +74,10 @@ class EventLog:
         return cls(path, descriptor, chain=None)
 
     def append(self, event: Event) -> None:
-        """Append one line; on return it is on the disk. Raises StudyError where it cannot be written or the existing
-        lines are unusable; the log is then unchanged, unless an incomplete line cannot be removed either: that is done
-        before the next line is written."""
+        """Append one line; on return it is on the disk. Raises StudyError where it cannot be written, the log was moved
+        or deleted, or the existing lines are unusable; the log is then unchanged, unless an incomplete line cannot be
+        removed either: that is done before the next line is written."""
+        _require_in_place(self._path, self._descriptor)
         incomplete_from = self._incomplete_from
         previous_size = os.fstat(self._descriptor).st_size if incomplete_from is None else incomplete_from
         if self._chain is None:
@@ -265,6 +266,22 @@ def _has_newer_version(line: bytes) -> bool:
         return False
     version = first_event.get("version")
     return isinstance(version, int) and version > SESSION_VERSION
+
+
+def _require_in_place(path: Path, descriptor: int) -> None:
+    """Raise StudyError unless the open log is still the file at its path: a line would be written into a deleted file,
+    or into a folder that is not the session's any more."""
+    try:
+        is_in_place = os.path.samestat(path.stat(), os.fstat(descriptor))
+    except OSError:
+        is_in_place = False
+    if not is_in_place:
+        raise StudyError(
+            "The session log is gone",
+            f"While the session ran, {path.name} was moved or deleted, or another file was put in its place: {path}.",
+            "Put the folder back in its place, from where it was moved to or from a copy.",
+            saved="Everything logged before is where the folder was moved to; lost if it was deleted.",
+        )
 
 
 def _write_all(descriptor: int, unwritten_bytes: bytes) -> None:

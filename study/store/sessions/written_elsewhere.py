@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
+from study.store.disk.atomic_write import sync_folder
 from study.store.disk.privacy import PRIVATE_FILE
 from study.store.disk.real_folder import is_real_file
 from study.store.sessions.archive import holds_session
@@ -56,14 +57,16 @@ def read_written_folders(data_folder: Path) -> tuple[Path, ...]:
 
 
 def _append_line(list_path: Path, line: bytes) -> None:
-    """Append a line with its end, on a line of its own, and sync it to the disk; a link in the place of the list is
-    replaced. By appending, programs that export at the same time do not lose each other's lines. Raises OSError."""
+    """Append a line with its end, on a line of its own, and sync it to the disk with the folder, in which the list may
+    be new; a link in the place of the list is replaced. By appending, programs that export at the same time do not lose
+    each other's lines. Raises OSError."""
     if list_path.is_symlink():
         list_path.unlink()
     with os.fdopen(os.open(list_path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE_FILE), "r+b", 0) as file:
         file.seek(max(0, file.seek(0, os.SEEK_END) - 1))
         file.write((b"" if file.read(1) in (b"", b"\n") else b"\n") + line)
         os.fsync(file.fileno())
+    sync_folder(list_path.parent)
 
 
 def _read_list(data_folder: Path) -> tuple[Path, ...]:

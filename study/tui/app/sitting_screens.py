@@ -13,6 +13,7 @@ from typing import Any
 
 from textual._styles_cache import StylesCache
 from textual.app import App
+from textual.command import CommandPalette
 from textual.screen import Screen
 from textual.widgets import Footer
 
@@ -34,6 +35,7 @@ from study.tui.engine.to_engine import Reply, ToEngine
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.confirm_view import ConfirmView
+from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen
 from study.tui.screens.form import FormScreen
@@ -63,8 +65,8 @@ SCREENS: dict[DisplayCall, Callable[[Any, Words], Screen[Any]]] = {
 """Screen for each request of the engine that needs only the content and the texts. `make_screen` makes the screens of
 the other requests, except that of a trial."""
 
-TEXT_DIALOGS = (NoteScreen, ConfirmView, NotePrompt)
-"""Dialogs of the experimenter that may be opened above any screen of a sitting, and into which text is typed."""
+TEXT_DIALOGS = (NoteScreen, ConfirmView, NotePrompt, CommandPalette)
+"""Dialogs that may be opened above any screen of a sitting, and into which text is typed."""
 STIMULUS_CALLS = (DisplayCall.SHOW_PLAYING, DisplayCall.ASK)
 """Requests during which a stimulus may play."""
 
@@ -95,6 +97,9 @@ def clear_render_caches(app: App[Any]) -> None:
 
 WARNING_DURATION_S = 8.0
 """Time for which a warning is shown (s). Chosen: long enough to read one sentence."""
+UNERASED_DURATION_S = 20.0
+"""Time for which it is shown that a withdrawal was cut short and erased nothing (s). Chosen: the participant may still
+look at the keyboard, and must tell the experimenter."""
 
 
 class SittingScreens:
@@ -237,13 +242,16 @@ class SittingScreens:
         self._pending_number = 0
 
     def _close_request_screen(self) -> None:
-        """Close the screen of the previous request and every screen above it (help, command palette), and take no
-        further answer on the trial's screen."""
+        """Close the screen of the previous request and every screen above it (help, a withdrawal that is not confirmed
+        yet, which is said to erase nothing), and take no further answer on the trial's screen."""
         self._pending_number = 0
         if self._trial_screen is not None:
             self._trial_screen.show_saved()  # the engine continues only after the answer is on disk
             self._trial_screen.disarm()
         request_screen, self._request_screen = self._request_screen, None
         while request_screen is not None and request_screen in self._app.screen_stack:
+            if isinstance(self._app.screen, ConfirmWithdrawal):
+                title, sentence = self.words["withdraw_title"], self.words["nothing_erased"]
+                self._app.notify(sentence, title=title, severity="warning", timeout=UNERASED_DURATION_S, markup=False)
             self._app.pop_screen()
         clear_render_caches(self._app)

@@ -284,7 +284,8 @@ def _read_home_view(command: ShowHome) -> HomeView:
 
 def _choose_device(command: Resume, logged_device: DeviceFacts) -> str:
     """Choose the name of the device on which a session is resumed. logged_device: that of the session's log."""
-    if command.follows_log and (command.device in REAL_DEVICES) == logged_device.simulated:
+    # A simulated session may go on on any simulated device: a log does not name the file of a replay.
+    if command.follows_log and (command.device in REAL_DEVICES or not logged_device.simulated):
         return find_device_option(logged_device.name, logged_device.simulated)
     return command.device
 

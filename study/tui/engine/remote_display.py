@@ -69,6 +69,10 @@ class RemoteDisplay:
         self._wake_delay_s = 0.0
         """Longest delay (s) of this process's own wake-ups since the last request was shown, or since the wait for the
         handle began."""
+        self._listen: Callable[[], None] = lambda: None
+
+    def listen_with(self, listen: Callable[[], None]) -> None:
+        self._listen = listen
 
     def fill_in(self, form: Form) -> FormReply:
         reply: FormReply = self._ask_screen(DisplayCall.FILL_IN, form)
@@ -196,10 +200,11 @@ class RemoteDisplay:
 
     def _ask_screen(self, call: DisplayCall, content: Any) -> Any:
         """Show a request and wait without limit for the reply, which is returned. Only while nothing plays, because the
-        screen may be suspended for any time and `sign_of_life` is not called."""
+        screen may be suspended for any time and `sign_of_life` is not called. An error of `listen` ends the wait; the
+        next request replaces the screen."""
         request_number = self._send_request(call, content)
         while (reply := self._await_reply(request_number)) is None:
-            pass
+            self._listen()
         return reply.value
 
     def _send_request(self, call: DisplayCall, content: Any) -> int:

@@ -74,8 +74,8 @@ class Resume:
     data: str
     """Path of the data folder."""
     follows_log: bool = False
-    """Whether the device that the session's log names takes the place of a `device` of another kind (real or
-    simulated); otherwise that is an error."""
+    """Whether the device that the session's log names takes the place of `device`, unless both are simulated; otherwise
+    a device of another kind (real or simulated) is an error."""
 
 
 @dataclass(frozen=True, slots=True)

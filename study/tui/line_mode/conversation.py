@@ -4,6 +4,7 @@ While it waits, it calls the sign of life of the session, which keeps the device
 """
 
 import textwrap
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import TextIO
@@ -50,6 +51,8 @@ class Conversation:
         self._output = output
         self.clock = clock
         self.words = words
+        self.listen: Callable[[], object] = lambda: None
+        """Called at each poll of `read_line` (`Display.listen_with`)."""
 
     def say(self, *sentences: str) -> None:
         """Write each sentence on a new line, wrapped at `LINE_WIDTH` between words."""
@@ -92,9 +95,17 @@ class Conversation:
             if now_s > until_s:
                 return WaitOver.TIME_LIMIT
 
-    def read_line(self) -> Line:
-        """Wait for the next line while no stimulus is played. Raises KeyboardInterrupt at the end of the input."""
-        result = self.wait(_keep_waiting)
+    def read_line(self, listen: Callable[[], object] | None = None) -> Line:
+        """Wait for the next line while no stimulus is played. listen: called at each poll in place of `self.listen`;
+        its result does not end the wait. Raises KeyboardInterrupt at the end of the input, and what `listen` raises."""
+        call = self.listen if listen is None else listen
+
+        def keep_waiting() -> bool:
+            """Sign of life that never ends the wait."""
+            call()
+            return True
+
+        result = self.wait(keep_waiting)
         if isinstance(result, WaitOver):
             raise KeyboardInterrupt
         return result
@@ -132,8 +143,3 @@ def quote_line(line: Line, words: Words = ENGLISH_WORDS) -> str:
     """Quote a typed line for a sentence, with at most 20 characters, chosen; an empty line is described in words."""
     shown_text = remove_control_characters(line.text)[:20]
     return f"'{shown_text}'" if shown_text else words["line_enter_alone"]
-
-
-def _keep_waiting() -> bool:
-    """Sign of life while no device runs: never ends the wait."""
-    return True

@@ -59,6 +59,9 @@ class PlainDisplay:
         self._announced_run: tuple[str, int] | None = None
         """Run whose progress was written last, so that it is written once per run."""
 
+    def listen_with(self, listen: Callable[[], None]) -> None:
+        self._conversation.listen = listen
+
     def fill_in(self, form: Form) -> FormReply:
         return plain_forms.ask_form(form, self._conversation)
 

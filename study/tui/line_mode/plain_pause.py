@@ -57,10 +57,10 @@ def run_pause(
             case "q":
                 return AfterPause.END_SITTING
             case "w":
-                if _confirm_withdrawal(conversation):
+                if _confirm_withdrawal(conversation, sign_of_life):
                     return AfterPause.WITHDRAW
             case "n" | "e" if store_note is not None:
-                _take_note(line.word == "e", conversation, store_note)
+                _take_note(line.word == "e", conversation, store_note, sign_of_life)
             case "?":
                 conversation.say(_list_pause_keys(store_note is not None, words))
             case _:
@@ -72,22 +72,25 @@ def _list_pause_keys(has_notes: bool, words: Words) -> str:
     return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if has_notes else [])))
 
 
-def _confirm_withdrawal(conversation: Conversation) -> bool:
-    """Ask the participant to confirm the withdrawal of consent by typing a word. Returns whether it was typed."""
+def _confirm_withdrawal(conversation: Conversation, sign_of_life: SignOfLife) -> bool:
+    """Ask the participant to confirm the withdrawal of consent by typing a word. Returns whether it was typed; a stop
+    that is requested meanwhile ends the pause only afterwards."""
     word = conversation.words["withdraw_word"]
     conversation.say_texts("withdraw_all")
     conversation.prompt(conversation.words.fill("line_withdraw", {"word": word}))
-    is_confirmed = conversation.read_line().word == word.casefold()
+    is_confirmed = conversation.read_line(sign_of_life).word == word.casefold()
     if not is_confirmed:
         conversation.say_texts("nothing_erased")
     return is_confirmed
 
 
-def _take_note(is_adverse: bool, conversation: Conversation, store_note: Callable[[NoteAsked], None]) -> None:
+def _take_note(
+    is_adverse: bool, conversation: Conversation, store_note: Callable[[NoteAsked], None], sign_of_life: SignOfLife
+) -> None:
     """Ask for the text of a note, or of an adverse event where `is_adverse`, and store it without control
-    characters; an empty line stores nothing."""
+    characters; an empty line stores nothing. A stop that is requested meanwhile ends the pause only afterwards."""
     conversation.prompt(conversation.words["line_happened" if is_adverse else "line_note"])
-    text = remove_control_characters(conversation.read_line().text)
+    text = remove_control_characters(conversation.read_line(sign_of_life).text)
     if not text:
         conversation.say_texts("nothing_written")
         return

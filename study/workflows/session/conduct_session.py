@@ -14,6 +14,7 @@ from study.devices.device import Device, DeviceInfo, Fault
 from study.devices.opening import open_device, open_lab_onset_line
 from study.errors import DeviceError
 from study.session.state.state import SessionState
+from study.session.stimulus.stimulus import MIN_SAMPLES_PER_PERIOD
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
@@ -94,6 +95,8 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
         contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
     ):
         _check_sensor(plan.protocol, device.info)
+        _check_rate(plan.protocol, device.info)
+        _check_fades(plan.protocol, device.info)
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened_session:
             return _run_sitting(opened_session, Equipment(device_name, device, equalized, pulse, sound), participant)
@@ -111,6 +114,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
         contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
     ):
         _check_sensor(state.protocol, device.info)
+        _check_rate(state.protocol, device.info)
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened_session:
             earlier_step_count = len(state.sitting.clock_steps)
@@ -126,6 +130,34 @@ def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
             "The sitting did not begin: its protocol needs the accelerometer",
             f"None is configured for the {info.name}.",
             "`hapteq doctor` on it says how to add one; or set accelerometer_needed = false in the protocol.",
+        )
+
+
+def _check_rate(protocol: StudyProtocol, info: DeviceInfo) -> None:
+    """Check that each stimulus has `MIN_SAMPLES_PER_PERIOD` at the device's rate; from half the rate on it would be
+    zero or of another frequency. Raises DeviceError otherwise."""
+    probe_hz = protocol.probes.to_hz if protocol.probes.is_enabled else 0.0
+    highest_hz = max((*protocol.all_frequencies_hz, probe_hz))
+    if info.sample_rate_hz < MIN_SAMPLES_PER_PERIOD * highest_hz:
+        raise DeviceError(
+            "The sitting did not begin: the device is too slow for its protocol",
+            f"The {info.name} runs at {info.sample_rate_hz:g} Hz, and {highest_hz:g} Hz need at least "
+            f"{MIN_SAMPLES_PER_PERIOD * highest_hz:g}.",
+            "Take a device of a higher rate, or lower frequencies in the protocol.",
+            saved="Nothing moved.",
+        )
+
+
+def _check_fades(protocol: StudyProtocol, info: DeviceInfo) -> None:
+    """Check that no fade of a stimulus is rounded to 0 ticks of the device. Raises DeviceError otherwise."""
+    shortest_fade_s = min(protocol.stimulus.fade_in_s, protocol.stimulus.fade_out_s)
+    if round(shortest_fade_s * info.sample_rate_hz) == 0:
+        raise DeviceError(
+            "The sitting did not begin: a fade of its protocol is too short",
+            f"{shortest_fade_s:g} s (stimulus.fade_in_s or fade_out_s) is no more than half a tick of the {info.name}, "
+            f"which runs at {info.sample_rate_hz:g} Hz: the force would jump.",
+            f"Set both to at least {1 / info.sample_rate_hz:g} s.",
+            saved="Nothing moved.",
         )
 
 

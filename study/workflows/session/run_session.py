@@ -5,12 +5,12 @@ The state machine is `study.session.state.machine`.
 """
 
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from protocols.procedure.practice import add_answer, count_right_of_last, is_practice_passed
 from protocols.trial import Phase
 from study.devices.device import Fault
-from study.errors import DeviceError, StudyError, UserInterruptError
+from study.errors import StudyError
 from study.session.facts.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.facts.void_reasons import describe_busy_voids, explain_many_voids
 from study.session.state.due_trial import PresentTrial, has_swapped_labels
@@ -18,20 +18,20 @@ from study.session.state.machine import Action, Demonstrate, EndSitting, FillIn,
 from study.session.state.probe_state import Probe, Reference
 from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, is_felt_by_person
-from study.session.views.archive_views import INELIGIBILITY_REASONS
-from study.session.views.count_text import format_answer_count
 from study.session.views.participant_views import Goodbye, PracticeResult, RestNotice, Welcome, make_direction_picture
-from study.session.views.resume_command import format_resume_command
 from study.store.sessions.log_seal import seal_log
+from study.workflows.ignored_interrupts import ignore_interrupts
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import assign_place
 from study.workflows.session.prepare_sitting import close_ineligible_session, prepare_sitting, present_form
+from study.workflows.session.session_end import SessionEnd, add_resume_advice, close_interrupted
 from study.workflows.trial.action_result import ActionResult
 from study.workflows.trial.demonstrate import demonstrate
 from study.workflows.trial.masking import check_masking, start_masking, stop_masking
 from study.workflows.trial.play_probe import play_probe, play_reference
 from study.workflows.trial.present_trial import present_trial
-from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, write_last_notes, write_notes
+from study.workflows.trial.session_supervisor import SittingStoppedError
+from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, write_notes
 from study.workflows.trial.take_pause import take_pause
 
 MAX_VOIDS_IN_A_ROW = 3
@@ -39,41 +39,30 @@ MAX_VOIDS_IN_A_ROW = 3
 participant may have left, and a stimulus must not play on an unattended handle. Chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class SessionEnd:
-    """State of the session at the end of a sitting, and why the sitting ended."""
-
-    state: SessionState
-    end_reason: str
-    """Why the sitting ended before the session was finished; empty if it is finished."""
-    fault: Fault = Fault.NONE
-    """Fault of the device that ended the sitting; NONE otherwise."""
-    fault_text: str = ""
-    """Description of the fault by the driver; empty where it gives none."""
-    withdrawn: bool = False
-    """Whether the participant withdrew consent, so that the data must be erased."""
-
-
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Run one sitting: until the session is finished, or the sitting ends early.
 
     KeyboardInterrupt (Ctrl-C, a closed terminal) stops the device at once and is raised as UserInterruptError, or as
     DeviceError where the force may still be on; a session that is closed in the log, or whose participant is
-    ineligible, ends normally instead. A StudyError is extended by the number of saved answers and the resume command.
+    ineligible, ends normally instead. A StudyError is extended by the number of saved answers and the resume command,
+    and says first where the force may still be on.
     In both cases notes that are not logged yet are logged first, where that is possible.
     """
     try:
         session_end = _run_sitting(state, sitting)
     except KeyboardInterrupt as interruption:
-        sitting.device.stop()
-        return _close_interrupted(sitting, interruption)
+        # A closed terminal interrupts twice: by its signal, and by the end of its input.
+        with ignore_interrupts():
+            sitting.device.stop()
+            return close_interrupted(sitting, interruption)
     except StudyError as error:
         sitting.device.stop()
-        raise _add_resume_advice(error, sitting) from error
+        raise add_resume_advice(error, sitting) from error
     except BaseException:
         sitting.device.stop()
         raise
-    # The sitting is over: Ctrl-C only ends the goodbye.
+    # The sitting is over: Ctrl-C only ends the goodbye, and a stop only takes the force off.
+    sitting.display.listen_with(sitting.supervisor.listen)
     with contextlib.suppress(KeyboardInterrupt):
         ineligibility = session_end.state.sitting.ineligibility if session_end.state.closed else ""
         sitting.display.goodbye(
@@ -90,6 +79,16 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
 
 
 def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
+    """Run the sitting up to its end in the log, also where a stop is requested while a form or a notice is open."""
+    sitting.display.listen_with(sitting.supervisor.listen_for_stop)
+    try:
+        return _prepare_and_run_actions(state, sitting)
+    except SittingStoppedError as stop:
+        logged_state = fold_session(sitting.folder).state
+        return _log_sitting_end(ActionResult(logged_state, end_reason=stop.reason), sitting)
+
+
+def _prepare_and_run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Prepare the sitting (forms, device check), assign the participant number, start the masking noise, show the
     instructions and perform the actions."""
     state, end_reason = prepare_sitting(state, sitting)
@@ -101,48 +100,6 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
     sitting.supervisor.start_activity("instructions")
     sitting.display.welcome(_make_welcome(state, sitting))
     return _run_actions(state, sitting)
-
-
-def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
-    """End a sitting after an interruption. If the participant does not take part, or the session is closed in the log
-    and the force is off, its end is returned. Otherwise the interruption is logged, and UserInterruptError is raised;
-    DeviceError where the force may still be on."""
-    state = write_last_notes(fold_session(sitting.folder).state, sitting)
-    may_force_remain = sitting.device.fault() is Fault.FORCE_LEFT
-    if state.is_finally_ineligible:  # nothing was played; its last line may be missing
-        state = state if state.closed else close_ineligible_session(state, sitting)
-        return SessionEnd(state, INELIGIBILITY_REASONS[state.sitting.ineligibility or "refused"])
-    if state.closed and not may_force_remain:
-        return SessionEnd(state, end_reason="")
-    # A full disk must not hide why the sitting ended.
-    with contextlib.suppress(StudyError):
-        sitting.log.append(
-            SessionInterrupted(
-                utc=sitting.clock.utc(),
-                reason="interrupted: Ctrl-C, or the terminal was closed",
-                monotonic_s=sitting.clock.now_s(),
-            )
-        )
-    resume_advice = f"Continue with: {format_resume_command(str(sitting.folder.path), sitting.device_name)}"
-    saved_text = f"{format_answer_count(state.answers)} on disk."
-    if may_force_remain:
-        raise DeviceError(
-            "The force may still be on", Fault.FORCE_LEFT.sentence, resume_advice, saved_text
-        ) from interruption
-    raise UserInterruptError("Interrupted", "The force was released.", resume_advice, saved_text) from interruption
-
-
-def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
-    """Extend the error, in place, by the number of saved answers and the command that continues the session; unchanged
-    where the log cannot be read or the participant does not take part."""
-    with contextlib.suppress(StudyError):
-        state = fold_session(sitting.folder).state
-        if not state.is_finally_ineligible:
-            error.saved = f"{format_answer_count(state.answers)} on disk."
-            resume_command = format_resume_command(str(sitting.folder.path), sitting.device_name)
-            error.do_now = f"{error.do_now} Then continue with: {resume_command}"
-        write_last_notes(state, sitting)
-    return error
 
 
 def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
@@ -206,7 +163,11 @@ def _perform_action(state: SessionState, action: Action, sitting: Sitting) -> Ac
 
 
 def _log_sitting_end(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
-    """Log why the sitting ended before the session was finished, and return its end."""
+    """Log why the sitting ended before the session was finished, and return its end. A force that may still be on is
+    named also where a stop ended the sitting, whose own fault is not reported."""
+    if outcome.fault is Fault.NONE and sitting.device.fault() is Fault.FORCE_LEFT:
+        reason = f"{outcome.end_reason}; {Fault.FORCE_LEFT.value}"
+        outcome = replace(outcome, end_reason=reason, fault=Fault.FORCE_LEFT)
     state = stop_masking(_report_busy_voids(write_notes(outcome.state, sitting), sitting), sitting)
     ending_event = SessionInterrupted(utc=sitting.clock.utc(), reason=outcome.end_reason)
     fault_text = sitting.device.health().why if outcome.fault is not Fault.NONE else ""

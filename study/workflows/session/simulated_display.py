@@ -80,6 +80,9 @@ class SimulatedDisplay:
             nominal_n=stimulus.nominal_n,
         )
 
+    def listen_with(self, listen: Callable[[], None]) -> None:
+        return None
+
     def fill_in(self, form: Form) -> FormReply:
         """Fill each field with the first answer that it allows; a participant who is eligible gives this answer."""
         return FormReply({field.key: _choose_first_answer(field) for field in form.fields})

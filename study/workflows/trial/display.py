@@ -40,6 +40,11 @@ once, with any reply."""
 class Display(Protocol):
     """Interface of the participant's screen: shows notices, forms and questions, and waits for the replies."""
 
+    def listen_with(self, listen: Callable[[], None]) -> None:
+        """Set the function that is called at least every 100 ms in each further wait without a sign of life: forms,
+        notices, the goodbye. It takes requests; an error that it raises ends the wait and is raised to the caller."""
+        ...
+
     def fill_in(self, form: Form) -> FormReply:
         """Show a form and return its answers, when every required field has a valid one."""
         ...

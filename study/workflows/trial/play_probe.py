@@ -11,12 +11,12 @@ from typing import Any, Literal
 import numpy as np
 
 from equalizer.signals.recording import Recording
-from protocols.definition.probes import PERIOD_S
+from protocols.definition.probes import PERIOD_S, PROBE_HOLD_S
 from study.devices.device import Fault, PlaybackResult
 from study.session.facts.events import ProbeMeasured, ProbePlayed
 from study.session.state.probe_state import Probe
 from study.session.state.state import SessionState
-from study.session.stimulus.probe_stimulus import PROBE_HOLD_S, make_probe_stimulus, make_reference_commands
+from study.session.stimulus.probe_stimulus import make_probe_stimulus, make_reference_commands
 from study.session.views.form_views import FormKind
 from study.session.views.forms import judge_form, make_form, make_take_handle_form, make_words
 from study.session.views.participant_views import PlayingNotice, Unanswered

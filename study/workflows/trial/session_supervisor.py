@@ -18,6 +18,15 @@ PLAYING_ACTIVITIES = ("trial", "demo", "probe", "reference")
 """Activities in which the device holds or plays a stimulus: a fault ends their wait."""
 
 
+class SittingStoppedError(Exception):
+    """A stop was requested while a form or a notice waited for the participant; the device is stopped already. reason:
+    why the sitting ends, a clause."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
 class SessionSupervisor:
     """Supervisor of one sitting. `keep_alive` is the keep-alive callback (`SignOfLife`) of every wait; afterwards
     `resolve` returns the reply of the wait: the answer, or the reason why there is none. `stop_requester` and
@@ -87,6 +96,13 @@ class SessionSupervisor:
                     self.pause_requester = who
                 case NoteAsked():
                     self._notes.append(request)
+
+    def listen_for_stop(self) -> None:
+        """Take pending requests while a form or a notice is open, in which nothing plays. Raises SittingStoppedError
+        once a stop is requested; a pause begins after the form."""
+        self.listen()
+        if self.stop_requester is not None:
+            raise SittingStoppedError(f"the {self.stop_requester} stopped the session")
 
     def resolve(self, reply: Reply) -> Reply:
         """Choose the reply to a wait, by priority: a stop request, the answer on the display, the answer by a button, a

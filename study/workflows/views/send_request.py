@@ -12,7 +12,7 @@ from study.store.sessions.request_inbox import RequestInbox
 
 RECEIVE_TIMEOUT_S = 3.0
 """Longest wait (s) until the session receives the request. Chosen: it reads its inbox several times a second, except
-while it shows a form or a notice."""
+while it checks the device."""
 POLL_INTERVAL_S = 0.02
 """Interval (s) at which the sender checks whether the request was received. Chosen below the session's interval."""
 
@@ -45,8 +45,7 @@ def _handle_timeout(folder: SessionFolder, request: Request, inbox: RequestInbox
     if isinstance(request, NoteAsked):
         return False
     explanation = (
-        f"{folder.name} accepted no request within {RECEIVE_TIMEOUT_S:g} s: "
-        "a form or a notice is being read, or it hangs."
+        f"{folder.name} accepted no request within {RECEIVE_TIMEOUT_S:g} s: it checks its device, or it hangs."
     )
     if isinstance(request, StopAsked):
         raise StudyError(

@@ -66,6 +66,7 @@ def make_line_from_state(state: SessionState, folder: SessionFolder) -> SessionL
         runs_done=state.run,
         runs=len(state.runs),
         standing=state.sitting.ineligibility or ("finished" if state.closed else "unfinished"),
+        device=session_opened.device.name,
     )
 
 
@@ -138,6 +139,7 @@ def _make_cached_line(folder: SessionFolder, file_stamps: tuple[tuple[str, int, 
         runs_done=run_count,
         runs=run_count,
         standing="finished",
+        device=session_opened.device.name,
     )
 
 

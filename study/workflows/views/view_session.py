@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from analysis.psychophysics.thresholds import RunEnd, Threshold
-from analysis.wording import MISSING, format_number
+from analysis.wording import MISSING, format_newtons
 from protocols.procedure.schedule import Run
 from protocols.trial import Phase
 from study.errors import StudyError
@@ -143,7 +143,7 @@ def _format_threshold_row(threshold: Threshold, run: Run) -> tuple[str, ...]:
     remark = "cut by the cap" if threshold.censored else ""
     if not threshold.complete:
         remark = "trial limit" if threshold.ended is RunEnd.TRIAL_LIMIT else "not complete"
-    threshold_text = f"{format_number(threshold.threshold_n, 3)} N" if threshold.complete else MISSING
+    threshold_text = f"{format_newtons(threshold.threshold_n, 3)} N" if threshold.complete else MISSING
     return (
         str(threshold.run + 1),
         run.phase.value,

@@ -153,3 +153,9 @@ def test_no_multisine_is_steeper_than_the_limits_made_for_it(from_hz, width, see
     (piece,) = make_pieces(source, RATE_HZ)
     steepest = np.linalg.norm(np.diff(piece.commands.samples, axis=0), axis=1).max() * RATE_HZ
     assert steepest < make_recording_limits(source).slew_n_per_s - SPRING_SLEW_N_PER_S
+
+
+def test_a_fade_that_is_no_tick_of_the_device_is_refused():
+    """The slew limit that follows from it would limit nothing."""
+    with pytest.raises(WrongUseError, match=r"the fade of 0.004 s is no more than half a tick.*Nothing moved"):
+        make_pieces(protocol(SineSegment("sine", (5.0,), 1.0, "x", duration_s=1.0), fade_s=0.004), 100.0)

@@ -85,3 +85,14 @@ def test_the_slew_limit_is_just_above_the_steepest_stimulus(small_protocol):
     )
     steady = np.abs(np.diff(3.0 * np.sin(2 * np.pi * 35.0 * np.arange(0, 1, 1 / RATE_HZ)))).max() * RATE_HZ
     assert max(steepest, steady) < limits.slew_n_per_s < 1.25 * (steady + 100.0)
+
+
+@pytest.mark.parametrize("rate_hz", [1000.0 / 3, 999.97, 1024.0, 2000.0 / 7])
+def test_at_a_rate_that_is_not_in_whole_tenths_the_loop_begins_again_without_a_jump(small_protocol, rate_hz):
+    vector = np.array([1.0, 0.0, 0.0])
+    stimulus = make_held_stimulus(small_protocol.stimulus, vector, 45.0, 1.0, IdentityEqualizer(), rate_hz)
+    wave = stimulus.loop.samples[:, 0]
+    line = np.abs(np.fft.rfft(wave))
+    assert line.max() == pytest.approx(len(wave) / 2)
+    assert np.sort(line)[-2] < 1e-6 * line.max()
+    assert np.argmax(line) * rate_hz / len(wave) == pytest.approx(45.0, abs=0.05)

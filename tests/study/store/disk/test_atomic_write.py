@@ -11,7 +11,7 @@ import pytest
 
 from study.errors import ExitCode
 from study.store.disk import atomic_write
-from study.store.disk.atomic_write import write_atomically
+from study.store.disk.atomic_write import reserve_space, write_atomically
 from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError, NotSyncedError
 
 REPOSITORY = Path(__file__).parents[4]
@@ -141,3 +141,27 @@ def test_a_program_killed_while_writing_leaves_a_whole_file(tmp_path):
     content = path.read_bytes()
     assert len(content) == 2_000_000
     assert len(set(content)) == 1
+
+
+def test_space_is_reserved_until_the_end_of_the_context_and_leaves_nothing(tmp_path):
+    with reserve_space(tmp_path / "a.h5", 1_000_000):
+        write_atomically(tmp_path / "b.txt", b"one")
+    write_atomically(tmp_path / "a.h5", b"one")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.h5", "b.txt"]
+
+
+@pytest.mark.parametrize("name", ["a.h5", f"{'a' * 245}.h5"])
+def test_where_there_is_no_space_or_the_name_is_too_long_the_body_is_not_run(tmp_path, name):
+    size = 1000 if len(name) > 200 else 100_000
+    with files_no_larger_than(10_000), pytest.raises(CannotWriteError), reserve_space(tmp_path / name, size):
+        pytest.fail("it was run")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_where_the_system_reserves_nothing_the_free_space_is_compared(tmp_path, monkeypatch):
+    monkeypatch.delattr(os, "posix_fallocate")
+    with reserve_space(tmp_path / "a.h5", 1000):
+        pass
+    with pytest.raises(CannotWriteError, match="The disk is full"), reserve_space(tmp_path / "a.h5", 10**18):
+        pytest.fail("it was run")
+    assert list(tmp_path.iterdir()) == []

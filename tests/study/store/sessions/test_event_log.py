@@ -170,8 +170,10 @@ def test_a_missing_log_is_said_so(tmp_path):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")  # noqa: PTH110
-def test_a_full_disk_is_an_error_that_says_what_is_safe():
-    log = EventLog(_NamedLike("P01_001"), os.open("/dev/full", os.O_WRONLY))
+def test_a_full_disk_is_an_error_that_says_what_is_safe(tmp_path):
+    path = tmp_path / "events.jsonl"
+    path.symlink_to("/dev/full")
+    log = EventLog(path, os.open(path, os.O_WRONLY))
     with pytest.raises(StudyError) as error:
         log.append(note("lost"))
     log.close()
@@ -205,9 +207,20 @@ except StudyError as error:
     assert written.read_bytes() == before
 
 
-class _NamedLike:
-    """Stands for a path in messages alone."""
-
-    def __init__(self, folder: str) -> None:
-        self.name = "events.jsonl"
-        self.parent = type("Folder", (), {"name": folder})()
+@pytest.mark.parametrize("is_replaced", [False, True])
+def test_nothing_is_logged_into_a_folder_that_was_moved_away(written, is_replaced):
+    log, away = EventLog.reopen(written), written.parent.with_name("away")
+    written.parent.rename(away)
+    if is_replaced:
+        written.parent.mkdir()
+        written.write_bytes((away / written.name).read_bytes())
+    with pytest.raises(StudyError, match="The session log is gone"):
+        log.append(note("third"))
+    assert len(read_log(away / written.name).events) == 2
+    if is_replaced:
+        written.unlink()
+        written.parent.rmdir()
+    away.rename(written.parent)
+    log.append(note("third"))
+    log.close()
+    assert len(read_log(written).events) == 3

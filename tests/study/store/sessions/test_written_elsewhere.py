@@ -1,6 +1,7 @@
 """Folders outside a data folder, noted for a withdrawal."""
 
 import os
+import stat
 
 from study.regular_file import MAX_DOCUMENT_BYTES
 from study.store.sessions import written_elsewhere
@@ -34,7 +35,7 @@ def test_a_list_whose_folder_cannot_be_synced_ends_nothing(tmp_path, monkeypatch
     def fail(folder):
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr("study.store.disk.atomic_write.sync_folder", fail)
+    monkeypatch.setattr("study.store.sessions.written_elsewhere.sync_folder", fail)
     note_written_folder(tmp_path / "data", tmp_path / "out")
     assert read_written_folders(tmp_path / "data") == (tmp_path / "out",)
 
@@ -72,3 +73,12 @@ def test_a_list_that_was_edited_keeps_its_last_line(tmp_path):
     (tmp_path / WRITTEN_ELSEWHERE_NAME).write_text("/mnt/old")
     note_written_folder(tmp_path, tmp_path / "a" / "new")
     assert [str(folder) for folder in read_written_folders(tmp_path)] == ["/mnt/old", str(tmp_path / "a" / "new")]
+
+
+def test_the_folder_of_a_new_list_is_synced(tmp_path, monkeypatch):
+    (tmp_path / "data").mkdir()
+    synced = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(os.fstat(descriptor)))
+    note_written_folder(tmp_path / "data", tmp_path / "out")
+    assert [stat.S_ISDIR(status.st_mode) for status in synced] == [False, True]
+    assert synced[1].st_ino == (tmp_path / "data").stat().st_ino

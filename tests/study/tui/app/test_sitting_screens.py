@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 from textual.app import App
-from textual.widgets import TextArea
+from textual.command import CommandPalette
+from textual.widgets import Input, TextArea
 
 from protocols.wording.words import ENGLISH_WORDS
 from study.session.views.participant_views import HandleView, PauseNotice, PlayingNotice
@@ -14,6 +15,7 @@ from study.tui.app.start_options import StartOptions
 from study.tui.engine.from_engine import CloseRequest, DisplayCall, PreparationStarted, ScreenRequest
 from study.tui.engine.to_engine import Reply
 from study.tui.keys.answer_keys import DIGITS
+from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
 from study.tui.screens.pause import PauseScreen
 from study.tui.screens.playing import PlayingScreen
@@ -94,5 +96,39 @@ def test_held_messages_are_released_in_turn_with_the_messages_of_the_engine(tmp_
             app._sitting = None
         assert len(released_by) >= 2
         assert {*released_by} == {*handled_by}
+
+    asyncio.run(story())
+
+
+def test_what_is_typed_into_the_command_palette_answers_nothing():
+    async def story():
+        app, sent = App(), []
+        async with app.run_test() as pilot:
+            sitting = SittingScreens(app, sent.append, DIGITS, lambda: None)
+            await sitting.handle_message(ScreenRequest(1, DisplayCall.AWAIT_HANDLE, AWAY))
+            await pilot.press("ctrl+p", "q")
+            assert CommandPalette.is_open(app)
+            await sitting.handle_message(CloseRequest(1))
+            await sitting.handle_message(ScreenRequest(2, DisplayCall.ASK, QUESTION))
+            await pilot.press("1")
+            assert sent == [Reply(2, PAUSE)]
+            assert app.screen.query_one(Input).value == "q1"
+
+    asyncio.run(story())
+
+
+def test_a_withdrawal_that_a_stop_cuts_short_is_said_to_erase_nothing():
+    async def story():
+        app, sent = App(), []
+        async with app.run_test() as pilot:
+            sitting = SittingScreens(app, sent.append, DIGITS, lambda: None)
+            await sitting.handle_message(ScreenRequest(1, DisplayCall.PAUSE, PauseNotice("a reason", 4)))
+            await pilot.press("down", "down", "enter", *"withdr")
+            assert isinstance(app.screen, ConfirmWithdrawal)
+            await sitting.handle_message(CloseRequest(1))
+            await pilot.pause()
+            assert [type(screen) for screen in app.screen_stack if isinstance(screen, ConfirmWithdrawal)] == []
+            assert [notification.message for notification in app._notifications] == ["Nothing is erased."]
+            assert sent == []
 
     asyncio.run(story())

@@ -108,11 +108,12 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
     ("requested", "logged", "opened"),
     [
         ("simulated", DeviceFacts("omega.3", simulated=False, sample_rate_hz=1000.0), "omega3"),
+        ("omega7", DeviceFacts("omega.3", simulated=False, sample_rate_hz=1000.0), "omega3"),
         ("omega3", DeviceFacts("simulated omega.3", simulated=True, sample_rate_hz=1000.0), "simulated"),
         ("calibrated:a.h5", DeviceFacts("simulated omega.3", simulated=True, sample_rate_hz=1000.0), "calibrated:a.h5"),
     ],
 )
-def test_a_session_is_resumed_from_the_list_on_a_device_of_its_kind(requested, logged, opened):
+def test_a_session_is_resumed_from_the_list_on_its_own_device(requested, logged, opened):
     assert _choose_device(Resume("P01_001", requested, "data", follows_log=True), logged) == opened
     assert _choose_device(Resume("P01_001", requested, "data"), logged) == requested
 

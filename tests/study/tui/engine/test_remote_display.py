@@ -234,3 +234,21 @@ def test_an_engine_that_understands_nothing_any_more_stops_its_device_and_ends(s
     with pytest.raises(KeyboardInterrupt):
         screen.display.await_return("a reason")
     assert "UnpicklingError" in capfd.readouterr().err
+
+
+class StopRequestedError(Exception):
+    """Raised by the function that listens for requests."""
+
+
+@pytest.mark.parametrize("call", ["fill_in", "device_checked", "welcome", "practice_over", "await_return"])
+def test_a_stop_ends_the_wait_of_a_form_and_of_each_notice(screen, call):
+    heard = []
+
+    def listen() -> None:
+        heard.append(call)
+        if len(heard) == 3:
+            raise StopRequestedError
+
+    screen.display.listen_with(listen)
+    with pytest.raises(StopRequestedError):
+        getattr(screen.display, call)("content")

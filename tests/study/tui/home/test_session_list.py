@@ -151,3 +151,13 @@ def test_no_column_of_the_list_is_cut(on_screen, home, width):
         assert "".join(line[place:].strip("│ ") for line in below).startswith(long.protocol)
 
     on_screen(HomeScreen(replace(home, sessions=(long, *lines[1:]))), story, (width, 40))
+
+
+def test_the_device_of_an_unfinished_session_is_named_before_it_is_resumed(on_screen, home):
+    unfinished = replace(home.sessions[2], device="omega.3")
+
+    async def story(sight):
+        await sight.press("f3")
+        assert "It can be resumed on the omega.3." in " ".join(sight.text.split())
+
+    on_screen(HomeScreen(replace(home, sessions=(unfinished,))), story, (110, 40))

@@ -1,15 +1,17 @@
 """The fact is on the disk before it is acted on: the order of disk and device, as they were really called."""
 
 import os
+import signal
 from dataclasses import dataclass, field, replace
 
 import pytest
 
 from study.devices.device import Fault, Health, PlaybackResult
-from study.errors import StudyError, UserInterruptError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.views.participant_views import Unanswered
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
+from study.store.sessions.log_seal import check_seals
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session import conduct_session
 from study.workflows.session.conduct_session import conduct_new
@@ -22,6 +24,7 @@ class FollowedSession:
     calls: list[str] = field(default_factory=list)
     fault: Fault = Fault.NONE
     missed: int = 0
+    force_left: bool = False
 
     def wrap(self, device):
         watched = self
@@ -41,6 +44,9 @@ class FollowedSession:
                     played.health, fault=watched.fault, missed_ticks=watched.missed, late_ticks=7, latest_s=0.0042
                 )
                 return replace(played, health=health)
+
+            def fault(self):
+                return Fault.FORCE_LEFT if watched.force_left else device.fault()
 
             def stop(self):
                 watched.calls.append("stop")
@@ -193,3 +199,67 @@ def test_a_force_that_stayed_on_is_reported_before_anything_is_written(sitter, w
     assert told == [Fault.FORCE_LEFT.value]
     released = watched.calls.index("release")
     assert watched.calls[released + 1] == "told"
+
+
+@pytest.mark.parametrize("is_damaged", [True, False])
+@pytest.mark.parametrize("trouble", [KeyboardInterrupt(), StudyError("The disk is full", "", "Free space.")])
+def test_a_force_that_may_remain_is_named_first_however_the_sitting_ends(sitter, watched, trouble, is_damaged):
+    log = sitter.data / "P01_001" / "events.jsonl"
+
+    def end():
+        watched.force_left = True
+        if is_damaged:
+            log.write_bytes(log.read_bytes().replace(b"answer_given", b"answer_taken"))
+        raise trouble
+
+    with pytest.raises(DeviceError, match="^The force may still be on") as error:
+        sitter.interrupted(2, end)
+    assert error.value.happened.startswith(Fault.FORCE_LEFT.sentence)
+    assert ("hapteq resume" in error.value.do_now) is not is_damaged
+
+
+def test_a_stop_after_which_the_force_may_remain_says_so(sitter, watched):
+    def leave():
+        watched.force_left = True
+        return Unanswered("the experimenter stopped the session", ends_sitting=True)
+
+    done = sitter.interrupted(2, leave)
+    assert (done.end_reason.endswith(Fault.FORCE_LEFT.value), done.fault) == (True, Fault.FORCE_LEFT)
+
+
+def test_a_session_closed_while_the_force_may_remain_is_sealed_to_its_last_line(sitter, watched, monkeypatch):
+    real = EventLog.append
+
+    def press(log, event) -> None:
+        real(log, event)
+        if event.event == "session_closed":
+            watched.force_left = True
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(EventLog, "append", press)
+    with pytest.raises(DeviceError, match="The force may still be on"):
+        sitter.whole()
+    contents = read_log(sitter.data / "P01_001" / "events.jsonl")
+    assert contents.events[-1].event == "session_closed"
+    assert check_seals(sitter.data / "P01_001", contents) == len(contents.events)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_interruption_does_not_cut_off_the_first(sitter, monkeypatch, number):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    def append(log, event, real=EventLog.append) -> None:
+        if event.event == "session_interrupted":
+            os.kill(os.getpid(), number)
+        real(log, event)
+
+    handler = signal.signal(number, interrupt)
+    monkeypatch.setattr(EventLog, "append", append)
+    try:
+        with pytest.raises(UserInterruptError, match="The force was released"):
+            sitter.interrupted(2, interrupt)
+        assert signal.getsignal(number) is interrupt
+    finally:
+        signal.signal(number, handler)
+    assert read_log(sitter.data / "P01_001" / "events.jsonl").events[-1].event == "session_interrupted"

@@ -69,6 +69,7 @@ def test_a_session_that_is_being_written_is_running_and_is_not_disturbed(unfinis
     finally:
         log.close()
     assert only(unfinished).standing == "unfinished"
+    assert only(unfinished).device == "simulated omega.3"
 
 
 def test_looking_leaves_every_file_as_it_was(unfinished):

@@ -7,13 +7,14 @@ import pytest
 from study.errors import StudyError, UserInterruptError
 from study.session.facts.events import (
     AnswerGiven,
+    FormFilled,
     NoteTaken,
     PauseTaken,
     RestTaken,
     TrialSpoiled,
 )
 from study.session.views.form_views import FormKind
-from study.session.views.participant_views import AfterPause
+from study.session.views.participant_views import AfterPause, Unanswered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, read_log
@@ -246,3 +247,24 @@ def test_a_note_is_logged_where_ctrl_c_comes_after_the_session_was_closed(plan, 
     end = conduct_new(plan(small_protocol), "simulated", seat)
     assert end.state.closed
     assert [note.text for note in of(end, NoteTaken)] == ["a rash"]
+
+
+@pytest.mark.parametrize("call", ["fill_in", "device_checked", "welcome", "await_return", "practice_over"])
+def test_a_stop_ends_each_screen_that_waits_for_the_participant(plan, full, seat, person, tmp_path, call):
+    listeners = []
+
+    def wait(notice):
+        RequestInbox(tmp_path / "data" / "P01_001").send(StopAsked("experimenter"))
+        listeners[-1]()
+
+    person.listen_with = listeners.append
+    setattr(person, call, wait)
+    if call == "await_return":
+        person.ask = lambda question, sign_of_life: Unanswered("no answer within the time limit", ends_sitting=False)
+    end = conduct_new(plan(full), "simulated", seat)
+    assert end.end_reason == "the experimenter stopped the session"
+    assert len(of(end, FormFilled)) == (0 if call == "fill_in" else 3)
+    listeners[-1]()  # the goodbye stays on the screen
+    again = Person(seat.clock)
+    resumed = conduct_resumed(end.folder, "simulated", Participant(display=again, hand=again, clock=seat.clock))
+    assert resumed.state.closed

@@ -11,9 +11,10 @@ from typer.testing import CliRunner
 
 from study.cli.main import app
 from study.errors import StudyError
-from study.store.sessions.archive import SessionFolder
+from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import EventLog
 from study.workflows.files.validate import validate_file
+from study.workflows.results import session_results
 from study.workflows.session.withdraw_participant import list_remaining_copies, plan_withdrawal, withdraw
 from tests.study.workflows.session.withdrawal.data_folder import UTC, copy_session, erase, files, write_analysis
 
@@ -238,3 +239,17 @@ def test_a_session_that_was_begun_after_the_question_and_runs_stops_the_withdraw
     log.close()
     erase(data)
     assert not (data / "P01_003" / "events.jsonl").exists()
+
+
+def test_tables_written_while_the_participant_withdrew_are_removed(data, monkeypatch):
+    """The results of a sitting that had just ended stayed in the erased session."""
+    folder, write_trials = SessionFolder(data / "P01_001"), session_results.write_trials
+
+    def erase_first(*arguments):
+        erase(data)
+        write_trials(*arguments)
+
+    monkeypatch.setattr(session_results, "write_trials", erase_first)
+    with pytest.raises(SessionWithdrawnError, match="This session was withdrawn"):
+        session_results.write_tables(folder)
+    assert {path.name for path in folder.path.iterdir()} == {"session.lock", "withdrawn.json"}
