@@ -26,6 +26,12 @@ Chosen."""
 PERIOD_S = 1.0
 """Period (s) of a probe's multisine: its odd lines are 2 Hz apart, and each of them drives a single axis."""
 
+FADE_S = 0.25
+"""Duration of a probe's raised-cosine fade at both ends (s). Chosen: long enough that the onset excites few modes."""
+
+PROBE_HOLD_S = FADE_S + PERIOD_S + 0.1
+"""Time from the start of a probe to its fade-out (s): fade-in, one whole period, and a margin of 0.1 s (chosen)."""
+
 LOWEST_LINE_HZ = 3.0
 """Lowest line (Hz): below it, the acceleration due to forces that are hardly felt is below the sensor's noise.
 Chosen."""

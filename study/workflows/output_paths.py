@@ -3,6 +3,7 @@
 Such results are not overwritten, and a long computation must not fail only when it writes them.
 """
 
+import os
 from pathlib import Path
 
 from study.errors import StudyError
@@ -17,7 +18,7 @@ def require_new_outputs(
     plural, for the error.
     """
     for path in (out_path, *further_paths):
-        if path.exists():
+        if os.path.lexists(path):  # a dangling link, too, is a name that is taken
             explanation = f"{path} exists already, and {kind} are never overwritten."
             raise StudyError(title, explanation, "Choose another name with --out.", saved=saved)
     if not out_path.absolute().parent.is_dir():

@@ -7,6 +7,7 @@ used by `force_dimension.rig`.
 """
 
 import contextlib
+import math
 import threading
 import time
 
@@ -30,6 +31,10 @@ and the drift of the bias since the calibration. Chosen: 1000 samples at 2 kHz."
 CLOCK_FIT_S = 120.0
 """Time (s) before a recording from which sample arrivals are included in the fit of the sensor's clock, besides those
 of the recording itself: long enough for 1 ppm, short enough for a nearly constant rate of a quartz that warms up."""
+
+CLIPPED_FOR_S = 0.002
+"""Time (s) for which a sample at its limit also marks later ones as clipped: the control loop, which only reads the
+newest sample, sees it although another one arrives before the next tick. Chosen: two ticks at 1 kHz."""
 
 LATENESS_S = 0.05
 """Wait (s) after the last tick for samples that are still on their way, in addition to half the length of the low-pass
@@ -73,8 +78,8 @@ class Accelerometer:
 
     def read_latest(self) -> tuple[FloatArray, bool]:
         """Read the newest acceleration, (3,), m/s², less the reading at rest, NaN without a sample younger than
-        `newest_sample.MAX_AGE_S`; and whether a channel was at its limit in a sample that arrived with it. May be
-        called from any thread."""
+        `newest_sample.MAX_AGE_S`; and whether a channel was at its limit in a sample that arrived with it, or up to
+        `CLIPPED_FOR_S` before. May be called from any thread."""
         return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
@@ -122,16 +127,15 @@ class Accelerometer:
     def _run_reading_loop(self) -> None:
         """Read the source until it is closed; the body of the reading thread. An error of the source ends it; readers
         detect that by the age of the newest sample."""
+        clipped_s = -math.inf
         with contextlib.suppress(Exception):
             while not self._close_requested.is_set():
                 samples, arrived_s = self._source.read()
                 if len(samples):
-                    clipped = bool(
-                        (samples.raw <= self._raw_range_limits[0]).any()
-                        or (samples.raw >= self._raw_range_limits[1]).any()
-                    )
+                    if ((samples.raw <= self._raw_range_limits[0]) | (samples.raw >= self._raw_range_limits[1])).any():
+                        clipped_s = arrived_s
                     acceleration_mps2 = self._calibration.to_acceleration(samples.raw[-1].astype(float))
-                    self._newest.add_sample(arrived_s, acceleration_mps2, clipped)
+                    self._newest.add_sample(arrived_s, acceleration_mps2, arrived_s - clipped_s <= CLIPPED_FOR_S)
                     self._history.add(samples, arrived_s, self._source.counts)
 
 

@@ -101,7 +101,7 @@ def read_lab_settings() -> LabSettings:
     cannot be read or is not valid."""
     path = locate_lab_file()
     try:
-        text = path.read_text("utf-8")
+        text = path.read_text("utf-8-sig")
     except FileNotFoundError:
         return LabSettings()
     except (OSError, UnicodeDecodeError) as error:
@@ -130,7 +130,7 @@ def write_sensor_table(sensor_table: str) -> Path:
     read_lab_settings()
     path = locate_lab_file()
     try:
-        previous_text = path.read_text("utf-8") if path.exists() else ""
+        previous_text = path.read_text("utf-8-sig") if path.exists() else ""
         text = _replace_sensor_table(previous_text, sensor_table)
         _parse_settings(text)
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -160,10 +160,10 @@ def _collect_readings(recording: Recording, path: Path) -> FloatArray:
             f"{path.name} has no acceleration of a handle as its response, three channels in m/s^2."
         )
     readings = np.zeros((len(recording), READING_SIZE))
-    for channel, samples in enumerate(position.samples.T, start=POSITION.start):
+    for channel, samples in enumerate(_arrange_axes(position, "").T, start=POSITION.start):
         (known_rows,) = np.nonzero(~np.isnan(samples))
         readings[:, channel] = np.interp(np.arange(len(samples)), known_rows, samples[known_rows])
-    readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = response.samples
+    readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = _arrange_axes(response, "a")
     return readings
 
 
@@ -181,7 +181,18 @@ def _select_excitation(recording: Recording, path: Path) -> FloatArray:
     excitation: Signal = recording.command if recording.excitation is None else recording.excitation
     if excitation.samples.shape[1] != 3 or set(excitation.units) != {"N"}:
         raise _make_replay_error(f"{path.name} has no force on a handle as its command, three channels in N.")
-    return np.nan_to_num(np.asarray(excitation.samples, dtype=np.float64))
+    return np.nan_to_num(_arrange_axes(excitation, "f"))
+
+
+def _arrange_axes(signal: Signal, prefix: str) -> FloatArray:
+    """Arrange the samples (n, 3) in the order x, y, z where the channels are named so, after the prefix, in another
+    order; channels with other names stay in their order."""
+    names = [f"{prefix}{axis}" for axis in "xyz"]
+    return (
+        signal.samples[:, [signal.channels.index(name) for name in names]]
+        if set(signal.channels) == set(names)
+        else signal.samples
+    )
 
 
 def _make_replay_error(reason: str) -> DeviceError:

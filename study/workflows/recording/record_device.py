@@ -5,7 +5,7 @@ fails, the pieces that are complete are written.
 """
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,14 +20,21 @@ from study.errors import DeviceError, UserInterruptError
 from study.session.stimulus.limits import make_recording_limits
 from study.session.stimulus.recording_pieces import make_pieces
 from study.session.views.handle_notice import BeforeMoving, format_recording_notice, refuse_unannounced
+from study.store.disk.atomic_write import reserve_space
+from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording
+from study.workflows.ignored_interrupts import ignore_interrupts
 from study.workflows.output_paths import require_new_outputs
 from study.workflows.recording.play_pieces import RecordedTake, play_pieces
 from study.workflows.recording.recording_metadata import describe_segment, describe_spring, list_warnings
 
 NOMINAL_RATE_HZ = 1000.0
 """Sample rate (Hz) with which durations are computed before a device is open."""
+
+BYTES_PER_SAMPLE, BYTES_PER_PIECE = 100, 4096
+"""Upper bounds of what a sample and a piece take in the file: four signals of three channels, of 8 bytes and their
+checksums; segment and metadata. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +74,9 @@ def record_device(
     repeated. `before_moving(notice)` is called before a real device moves, with the notice for the people around it;
     an exception from it keeps the device still. The default refuses every real device.
 
-    Raises StudyError before anything moves if `out` exists already or has no folder. Raises UserInterruptError after
-    KeyboardInterrupt, and DeviceError if the device fails or may still exert a force after the interruption; the
-    complete pieces are written before.
+    Raises StudyError before anything moves if `out` exists already, has no folder, or no space is left for it: that is
+    reserved until the file is written. Raises UserInterruptError after KeyboardInterrupt, and DeviceError if the device
+    fails or may still exert a force after the interruption; the complete pieces are written before.
     """
     require_new_output(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -87,9 +94,10 @@ def record_on_device(
     `record_device`, but `require_new_output` is left to the caller."""
     takes: list[RecordedTake] = []
     try:
-        if not device.info.simulated:
-            before_moving(format_recording_notice(plan.protocol, device.info.name, plan.total_s))
-        play_pieces(plan.protocol, device, takes, on_progress)
+        with _reserve_space(plan, device.info.sample_rate_hz):
+            if not device.info.simulated:
+                before_moving(format_recording_notice(plan.protocol, device.info.name, plan.total_s))
+            play_pieces(plan.protocol, device, takes, on_progress)
     except KeyboardInterrupt as interruption:
         _write_complete_takes(plan, device, takes)
         if device.fault() is Fault.FORCE_LEFT:  # more important to say than the interruption
@@ -100,6 +108,20 @@ def record_on_device(
         error.saved = _describe_saved(plan, len(takes))
         raise
     return _write_takes(plan, device, takes, interrupted=False)
+
+
+@contextlib.contextmanager
+def _reserve_space(plan: RecordingPlan, sample_rate_hz: float) -> Iterator[None]:
+    """Context that keeps free space for the file, which is written at the end. Raises CannotWriteError before the body
+    where there is none."""
+    pieces = make_pieces(plan.protocol, sample_rate_hz)
+    sample_count = sum(len(piece.commands) for piece in pieces)
+    try:
+        with reserve_space(plan.out, BYTES_PER_SAMPLE * sample_count + BYTES_PER_PIECE * (1 + len(pieces))):
+            yield
+    except CannotWriteError as error:
+        error.saved = "Nothing moved, and nothing was written."
+        raise
 
 
 def require_new_output(out_path: Path) -> None:
@@ -153,8 +175,9 @@ def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
 
 def _write_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake], interrupted: bool) -> WrittenRecording:
     """Join the pieces into one recording with a segment each, and write it."""
-    piece_recordings = [replace(take.recording, segments=(take.piece.segment,)) for take in takes]
-    write_recording(plan.out, join_recordings(piece_recordings, _make_metadata(plan, device, takes, interrupted)))
+    with ignore_interrupts():
+        piece_recordings = [replace(take.recording, segments=(take.piece.segment,)) for take in takes]
+        write_recording(plan.out, join_recordings(piece_recordings, _make_metadata(plan, device, takes, interrupted)))
     return WrittenRecording(plan.out, tuple(warning for take in takes for warning in list_warnings(take)))
 
 

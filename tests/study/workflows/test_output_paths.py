@@ -28,3 +28,8 @@ def test_a_folder_that_is_not_there_is_not_made(tmp_path):
     said = refusal(tmp_path / "no" / "new.h5")
     assert f"There is no folder {tmp_path / 'no'} to write new.h5 into." in said.happened
     assert "Make the folder first" in said.do_now
+
+
+def test_a_link_to_nowhere_is_a_name_that_is_taken(tmp_path):
+    (tmp_path / "link.h5").symlink_to(tmp_path / "nowhere.h5")
+    assert "exists already" in refusal(tmp_path / "link.h5").happened

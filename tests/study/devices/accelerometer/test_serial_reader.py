@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import time
 import tomllib
 import tty
 
@@ -10,8 +11,9 @@ import pytest
 from pydantic import TypeAdapter
 
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP_DIRECTIONS
-from study.devices.accelerometer.newest_sample import MAX_AGE_S
+from study.devices.accelerometer.newest_sample import IS_CLIPPED, MAX_AGE_S, SAMPLE_COUNT
 from study.devices.accelerometer.parser import PACKET_SIZE
+from study.devices.accelerometer.samples import PacketCounts, Samples
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.accelerometer.six_positions import calibrate_in_six_positions
@@ -127,3 +129,31 @@ def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
 def test_a_sensor_that_was_never_turned_is_not_calibrated(board):
     with pytest.raises(DeviceError, match="was not calibrated"):
         calibrate_in_six_positions(board.path, 115_200, lambda position, heard: None, rest_s=0.1)
+
+
+class _Batches:
+    """A source of samples (raw, arrival in s), whose last never comes."""
+
+    counts = PacketCounts()
+
+    def __init__(self, *batches: tuple[float, float]) -> None:
+        self.batches = list(batches)
+
+    def read(self) -> tuple[Samples, float]:
+        if not self.batches:
+            time.sleep(0.001)
+            return Samples(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)), np.zeros(0, int)), 0.0
+        raw, arrived_s = self.batches.pop(0)
+        zero = np.zeros(1, int)
+        return Samples(zero, zero + round(1e6 * arrived_s), np.array([[32_768.0, raw, 32_768.0]]), zero), arrived_s
+
+    def close(self) -> None:
+        self.batches.clear()
+
+
+@pytest.mark.parametrize(("later_s", "is_marked"), [(0.0005, True), (0.0011, True), (0.01, False)])
+def test_a_clipped_sample_is_seen_at_the_next_tick_although_another_came_in_between(later_s, is_marked):
+    source = _Batches((32_768.0, 1.0), (65_535.0, 1.1), (32_768.0, 1.1 + later_s))
+    with contextlib.closing(Accelerometer(source, IDEAL, RAW_RANGE)) as sensor:
+        assert within(5.0, lambda: sensor.samples[0, SAMPLE_COUNT] == 3.0)
+        assert [bool(sensor.samples[row, IS_CLIPPED]) for row in (1, 2, 3)] == [False, True, is_marked]

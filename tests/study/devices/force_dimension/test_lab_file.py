@@ -122,3 +122,11 @@ def test_a_number_in_any_notation_of_toml_is_read(file, text, mass_kg):
     file.parent.mkdir()
     file.write_text(f"effector_mass_kg = {text}")
     assert read_lab_settings().effector_mass_kg == mass_kg
+
+
+def test_a_byte_order_mark_of_an_editor_is_no_error(file):
+    file.parent.mkdir()
+    file.write_text("effector_mass_kg = 0.1\n", "utf-8-sig")
+    assert read_lab_settings().effector_mass_kg == 0.1
+    write_sensor_table(TABLE)
+    assert read_lab_settings().effector_mass_kg == 0.1

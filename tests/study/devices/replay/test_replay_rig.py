@@ -201,3 +201,19 @@ def test_a_file_that_is_no_recording_is_an_error_of_the_device(rigs, tmp_path, c
         path.write_bytes(content)
     with pytest.raises(DeviceError, match="This cannot be replayed"):
         open_device(f"replay:{path}", rigs.SETTINGS, VirtualClock(), seed=1)
+
+
+def test_axes_in_another_order_are_told_by_their_names(rigs, originals, commands, tmp_path):
+    def turned(signal: Signal) -> Signal:
+        return replace(
+            signal, samples=signal.samples[:, [2, 0, 1]], channels=tuple(signal.channels[i] for i in (2, 0, 1))
+        )
+
+    original = originals[0]
+    names = ("command", "excitation", "response", "position")
+    write_recording(
+        tmp_path / "turned.h5", replace(original, **{name: turned(getattr(original, name)) for name in names})
+    )
+    (found,) = played_on(f"replay:{tmp_path / 'turned.h5'}", rigs, [commands[0]])
+    np.testing.assert_array_equal(found.response.samples, original.response.samples)
+    np.testing.assert_array_equal(found.position.samples, original.position.samples)

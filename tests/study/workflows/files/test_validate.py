@@ -7,14 +7,16 @@ import pytest
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from protocols.document.loading import load_protocol
 from protocols.trial import Trial
+from study.errors import StudyError
 from study.session.facts.events import SESSION_FORMAT
 from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.json_document import write_json
 from study.store.formats.daily_check_file import DailyCheck, write_daily_check
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.participant_texts import make_language_template
-from study.store.formats.protocol_files import list_shipped_protocols
+from study.store.formats.protocol_files import list_shipped_protocols, read_study_protocol
 from study.store.formats.recording_file import write_recording
 from study.store.formats.thresholds_file import write_thresholds
 from study.store.sessions.event_log import LOG_NAME
@@ -226,3 +228,31 @@ def test_a_log_is_not_checked_under_another_name_by_the_log_of_its_folder(tmp_pa
     copy = written(tmp_path / "copy.jsonl", f'{{"format": "{SESSION_FORMAT}"}}\n')
     found = validate_file(copy)
     assert found.problems == (f"a log is only checked under its name {LOG_NAME} in the folder of its session.",)
+
+
+UNFIT_FOR_NEW_SESSIONS = {
+    "detection": ("longest_trial_s = 1.5\n", "[detection]\nfrequencies_hz = [25.0]\n", "detection.interval_s is 1.5 s"),
+    "demo": ("longest_trial_s = 2.0\n", "[demo]\nlevel_n = 1.0\n", "demo.seconds is 2 s"),
+    "probes": ("longest_trial_s = 1.35\n", "[probes]\nlevels_n = [0.2]\n", "a probe (probes.levels_n) is 1.35 s"),
+    "fade-in": ("longest_trial_s = 0.1\n", "", "stimulus.fade_in_s is 0.1 s"),
+    "short fade": ("", "", "stimulus.fade_out_s is 0.0005 s, no more than half a tick"),
+}
+
+
+@pytest.mark.parametrize("case", UNFIT_FOR_NEW_SESSIONS)
+def test_a_protocol_that_no_session_can_finish_is_a_problem_of_its_file_and_not_of_old_logs(tmp_path, small_text, case):
+    safety, table, said = UNFIT_FOR_NEW_SESSIONS[case]
+    text = small_text.replace("[safety]\n", f"[safety]\n{safety}").replace("keep_s = 0.2", "keep_s = 1.0") + table
+    text = text.replace("fade_out_s = 0.05", "fade_out_s = 0.0005") if case == "short fade" else text
+    file = written(tmp_path / "study.toml", text)
+    assert said in " ".join(validate_file(file).problems)
+    with pytest.raises(StudyError, match="is not a usable protocol"):
+        read_study_protocol(str(file))
+    assert load_protocol(text, "the log").kind == "study"
+
+
+def test_a_recording_protocol_whose_fade_is_no_tick_is_a_problem_of_its_file(tmp_path):
+    text = (SHIPPED / "sweep.toml").read_text("utf-8").replace("fade_s = 0.1 ", "fade_s = 0.0001 ")
+    assert "fade_s is 0.0001 s, no more than half a tick" in " ".join(
+        validate_file(written(tmp_path / "sweep.toml", text)).problems
+    )

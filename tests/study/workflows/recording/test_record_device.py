@@ -1,13 +1,18 @@
 """Recordings on the simulated device."""
 
+import os
+import signal
+
 import numpy as np
 import pytest
 
+import study.workflows.recording.record_device as record_device_module
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import SineSegment, SweepSegment
 from study.errors import StudyError, UserInterruptError
-from study.store.formats.recording_file import read_recording
+from study.store.disk.file_errors import CannotWriteError
+from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 PROTOCOL = RecordingProtocol(
@@ -76,3 +81,44 @@ def test_interrupted_at_once_nothing_is_written(tmp_path):
 def test_a_folder_that_does_not_exist_is_reported_before_anything_moves(tmp_path):
     with pytest.raises(StudyError, match="There is no folder"):
         record_device(plan(tmp_path / "nowhere" / "r.h5"), lambda _: None)
+
+
+def test_without_space_for_the_file_nothing_is_played(tmp_path, monkeypatch):
+    def refuse(*arguments) -> None:
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(os, "posix_fallocate", refuse)
+    played: list[float] = []
+    with pytest.raises(CannotWriteError, match="The disk is full") as refused:
+        record_device(plan(tmp_path / "r.h5"), played.append)
+    assert (refused.value.saved, played) == ("Nothing moved, and nothing was written.", [])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_reserved_space_is_enough_for_the_file(tmp_path, monkeypatch):
+    reserved: list[int] = []
+    monkeypatch.setattr(os, "posix_fallocate", lambda descriptor, start, size: reserved.append(size))
+    record_device(plan(tmp_path / "r.h5"), lambda _: None)
+    assert (tmp_path / "r.h5").stat().st_size <= reserved[0]
+
+
+@pytest.mark.parametrize("signal_name", ["SIGINT", "SIGTERM"])
+def test_an_interruption_while_the_file_is_written_loses_nothing(tmp_path, monkeypatch, signal_name):
+    def interrupt(seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    def write_interrupted(*arguments) -> None:
+        os.kill(os.getpid(), getattr(signal, signal_name))
+        write_recording(*arguments)
+
+    before = signal.signal(getattr(signal, signal_name), lambda *_: interrupt(0.0))
+    monkeypatch.setattr(record_device_module, "write_recording", write_interrupted)
+    try:
+        record_device(plan(tmp_path / "r.h5"), lambda _: None)
+        handler = signal.getsignal(getattr(signal, signal_name))
+    except KeyboardInterrupt:
+        pytest.fail("the recording is lost")
+    finally:
+        signal.signal(getattr(signal, signal_name), before)
+    assert handler is not signal.SIG_IGN
+    assert len(read_recording(tmp_path / "r.h5").segments) == 3
