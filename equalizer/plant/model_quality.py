@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-NOT_STORED = "Quality not stored: the model file is of an earlier version; identify it again to know its error."
+NOT_STORED = "No quality is stored with the model: identify it again from its recordings to know its error."
 """Sentence for a model whose file states no quality, and for a session that was equalized with such a model."""
 
 
@@ -18,9 +18,10 @@ class ModelQuality:
     """Root-mean-square errors in the model's band, as fractions of the response. Raises ValueError for a negative or
     non-finite figure."""
 
-    expected_error: float
+    expected_error: float | None
     """Error of the model against the device, exceeded in 5 % of cases on recordings like these; not smaller than any
-    error below except the noise."""
+    error below except the noise. None = not known, because the fitted lines contain transients or leakage and no record
+    was held out."""
     misfit_error: float
     """Error against the fitted lines, beyond their noise."""
     scatter_error: float | None = None
@@ -47,15 +48,16 @@ def summarise_quality(
     scatter_error: float | None,
     held_out: tuple[float, float | None, float] | None,
     remarks: tuple[str, ...] = (),
-    misfit_bound: float = 0.0,
+    misfit_bound: float | None = 0.0,
 ) -> ModelQuality:
     """Summarise the errors of a model. The expected error is the root of the summed squares of misfit and scatter, and
     at least the held-out error. held_out: error, noise, and length of the record (s). misfit_bound: upper bound of the
-    misfit that the noise of the fitted lines may hide; used in place of a smaller misfit_error."""
-    model_error = float(np.hypot(max(misfit_error, misfit_bound), scatter_error or 0.0))
+    misfit that the noise of the fitted lines may hide; used in place of a smaller misfit_error. None where no bound is
+    known: the expected error is then not known without a held-out error."""
+    model_error = float(np.hypot(max(misfit_error, misfit_bound or 0.0), scatter_error or 0.0))
     held_out_error, held_out_noise, held_out_s = held_out or (None, None, None)
     return ModelQuality(
-        max(model_error, held_out_error or 0.0),
+        None if misfit_bound is None and held_out_error is None else max(model_error, held_out_error or 0.0),
         misfit_error,
         scatter_error,
         held_out_error,
@@ -70,6 +72,12 @@ def write_quality_sentence(quality: ModelQuality | None) -> str:
     expected error in it includes the held-out error, see `summarise_quality`."""
     if quality is None:
         return NOT_STORED
+    if quality.expected_error is None:
+        return (
+            f"The error of the model is not known (misfit {100 * quality.misfit_error:.2f} % on the fitted lines "
+            "beyond their noise): no recording was held out for a test, and without two counted periods of every sweep "
+            "the lines contain transients, which hide errors. Record three periods, or a test."
+        )
     if quality.held_out_error is None:
         return (
             "No recording was held out for a test; on the lines to which it was fitted, the error of the model is "
@@ -98,11 +106,11 @@ def write_quality_brief(quality: ModelQuality | None) -> str:
 
 
 def find_worst_quality(qualities: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
-    """Find the quality with the largest expected error of several models; None without models, or where the quality of
-    a model is not stored."""
+    """Find the quality with the largest expected error, an unknown one first, of several models; None without models,
+    or where the quality of a model is not stored."""
     stored_qualities = [quality for quality in qualities if quality is not None]
     return (
-        max(stored_qualities, key=lambda quality: quality.expected_error)
+        max(stored_qualities, key=lambda quality: np.inf if quality.expected_error is None else quality.expected_error)
         if len(stored_qualities) == len(qualities) and stored_qualities
         else None
     )

@@ -31,7 +31,16 @@ def test_a_model_that_was_not_tested_says_so_and_gives_its_misfit():
     assert write_quality_brief(summarise_quality(0.08, 0.002, None)) == "not tested, misfit 8 %"
 
 
-def test_an_old_model_says_that_its_quality_is_not_stored():
+def test_an_error_that_transients_may_hide_is_not_stated_without_a_test():
+    unknown = summarise_quality(0.01, 0.002, None, misfit_bound=None)
+    assert unknown.expected_error is None
+    assert "is not known (misfit 1.00 %" in write_quality_sentence(unknown)
+    assert find_worst_quality((ModelQuality(0.5, 0.5), unknown)) is unknown
+    assert summarise_quality(0.01, 0.002, (0.3, None, 2.0), misfit_bound=None).expected_error == 0.3
+
+
+def test_a_model_without_a_stored_quality_says_so_and_not_how_old_it_is():
+    assert "version" not in NOT_STORED
     assert write_quality_sentence(None) == NOT_STORED
     assert write_quality_brief(None) == "quality not stored"
     assert find_worst_quality((ModelQuality(0.1, 0.1), None)) is None

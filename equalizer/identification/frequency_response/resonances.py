@@ -2,7 +2,9 @@
 
 Peaks are searched on averages over bins of equal width in octaves: of the largest singular value of the response matrix
 (gain), and of the Frobenius norm of its off-diagonal entries (coupling). A mode with one pole pair is then fitted to
-the lines around each peak (`single_mode`); its 95 % intervals are quantiles of refits with added noise.
+the lines around each peak (`single_mode`). Its 95 % intervals are quantiles of refits with added noise, widened on both
+sides by the misfit of a single mode: by the largest change of the result where the numerator, which stands for the
+other modes, has one or two more powers.
 """
 
 from dataclasses import dataclass, replace
@@ -42,10 +44,11 @@ class Resonance:
     frequency_hz: float
     """Natural frequency of the fitted mode."""
     frequency_interval_hz: tuple[float, float]
-    """95 % interval, from refits with added noise; of no width where the noise is not known."""
+    """95 % interval, from refits with added noise and the misfit of a single mode; without the noise where that is not
+    known."""
     damping_ratio: float
     damping_interval: tuple[float, float]
-    """95 % interval of the damping ratio, from the same refits."""
+    """95 % interval of the damping ratio, from the same fits."""
     width_hz: float
     """Half-power bandwidth (Hz), 2 damping_ratio frequency_hz."""
     prominence_db: float
@@ -118,6 +121,11 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
     natural_hz, damping_ratio = fit_single_mode(binned.frequency_hz, entries)
     if not np.isfinite(natural_hz[0]):
         return None
+    more_powers = np.array([fit_single_mode(binned.frequency_hz, entries, degree) for degree in (3, 4)])[:, :, 0]
+    # A fit with more powers that finds no mode leaves the misfit to the other; without any, it is not known.
+    if np.isnan(more_powers).all():
+        return None
+    misfit_hz, damping_misfit = np.nanmax(np.abs(more_powers - (natural_hz[0], damping_ratio[0])), axis=0)
     normal_draws = np.random.default_rng(search.seed).standard_normal((2, search.draws, *entries.shape[1:]))
     noisy_entries = entries + np.sqrt(noise_variance / 2) * (normal_draws[0] + 1j * normal_draws[1])
     drawn_natural_hz, drawn_damping_ratios = fit_single_mode(binned.frequency_hz, noisy_entries)
@@ -126,19 +134,20 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
         return None
     return Resonance(
         frequency_hz=float(natural_hz[0]),
-        frequency_interval_hz=_compute_interval(drawn_natural_hz),
+        frequency_interval_hz=_compute_interval(drawn_natural_hz, float(misfit_hz)),
         damping_ratio=float(damping_ratio[0]),
-        damping_interval=_compute_interval(drawn_damping_ratios),
+        damping_interval=_compute_interval(drawn_damping_ratios, float(damping_misfit)),
         width_hz=float(2 * damping_ratio[0] * natural_hz[0]),
         prominence_db=peak.prominence_db,
         seen_in=(peak.curve_name,),
     )
 
 
-def _compute_interval(draws: FloatArray) -> tuple[float, float]:
-    """Compute the 95 % interval of draws (draws,), as the 2.5 % and 97.5 % quantiles; NaN is left out."""
+def _compute_interval(draws: FloatArray, misfit: float) -> tuple[float, float]:
+    """Compute the 95 % interval of draws (draws,), as the 2.5 % and 97.5 % quantiles, widened on both sides by the
+    misfit (unit of the draws); NaN is left out."""
     low, high = np.nanquantile(draws, (0.025, 0.975))
-    return float(low), float(high)
+    return float(low) - misfit, float(high) + misfit
 
 
 def _is_same_mode(first: Resonance, second: Resonance) -> bool:

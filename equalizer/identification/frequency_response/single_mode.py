@@ -15,10 +15,12 @@ _LINEAR_ITERATIONS, _NEWTON_ITERATIONS = 3, 8
 Chosen."""
 
 
-def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[FloatArray, FloatArray]:
+def fit_single_mode(
+    frequency_hz: FloatArray, entries: ComplexArray, numerator_degree: int = 2
+) -> tuple[FloatArray, FloatArray]:
     """Fit natural frequencies (draws,), Hz, and damping ratios (draws,); NaN where the fit is unstable or its natural
     frequency is not between the first and the last line. frequency_hz: (lines,), ascending, at least six. entries:
-    (draws, lines, entries of the matrix).
+    (draws, lines, entries of the matrix). numerator_degree: 2 as in the module docstring, or another number of powers.
 
     Reweighted linear equations (Sanathanan and Koerner 1963) give starting values, whose damping is biased by noise;
     Gauss-Newton steps on the least-squares error remove that bias (variable projection, Kaufman 1975). Each step of c1
@@ -26,7 +28,7 @@ def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[Fl
     """
     centre_hz = float(np.sqrt(frequency_hz[0] * frequency_hz[-1]))
     s = np.asarray(1j * frequency_hz / centre_hz, dtype=np.complex128)
-    powers_of_s = np.stack([np.ones_like(s), s, s**2], axis=1)
+    powers_of_s = np.vander(s, numerator_degree + 1, increasing=True)
     c1, c0 = np.zeros(len(entries)), np.ones(len(entries))
     inverse_denominator: ComplexArray = np.ones((len(entries), len(s)), dtype=np.complex128)
     for _ in range(_LINEAR_ITERATIONS):
@@ -59,7 +61,7 @@ def _invert_denominator(s: ComplexArray, c1: FloatArray, c0: FloatArray) -> Comp
 
 
 def _compute_numerator_basis(powers_of_s: ComplexArray, inverse_denominator: ComplexArray) -> ComplexArray:
-    """Compute an orthonormal basis (draws, lines, 3) of the functions (n0 + n1 s + n2 s²) / (s² + c1 s + c0)."""
+    """Compute an orthonormal basis (draws, lines, powers) of the functions s^k / (s² + c1 s + c0)."""
     basis: ComplexArray = np.linalg.qr(powers_of_s * inverse_denominator[:, :, None])[0]
     return basis
 

@@ -89,8 +89,10 @@ class IdentificationResult(SummaryDisplay):
     @property
     def expected_error(self) -> float | None:
         """95 % bound of the total error, relative to the response: `scatter`, and the upper bound of the misfit; None
-        without draws."""
-        return None if self.scatter is None else float(np.hypot(self.scatter, self.misfit.upper_bound))
+        without draws or without that bound."""
+        if self.scatter is None or self.misfit.upper_bound is None:
+            return None
+        return float(np.hypot(self.scatter, self.misfit.upper_bound))
 
     @property
     def slowest_decay_s(self) -> float:

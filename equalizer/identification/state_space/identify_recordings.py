@@ -98,7 +98,7 @@ def _add_misfit_causes(
     because neighbours share their lines."""
     identified, is_averaged = result.identified, result.fitted is not result.estimate
     misfit = compute_estimate_misfit(identified.model, result.estimate) if is_averaged else identified.misfit
-    misfit = misfit if has_repeats else replace(misfit, smooth=None)
+    misfit = misfit if has_repeats else replace(misfit, smooth=None, upper_bound=None)
     cost = misfit.cost if is_averaged else identified.cost
     causes = describe_misfit_causes(cost, misfit, identified.relaxed, identified.is_bound_binding, settings)
     remarks = (*([SMOOTHED_REMARK] if is_averaged else []), *causes, *write_outside_gain_remark(identified.chosen))
@@ -109,8 +109,8 @@ def _has_repeats(recordings: Sequence[Recording]) -> bool:
     """Whether there is a periodic experiment, and every one has at least two counted periods.
 
     In a single period, or in windows, transient and leakage look like lightly damped resonances, so that poles are not
-    relaxed on their evidence. Noise estimated from the scatter of the lines does not reveal the cause of a misfit
-    either.
+    relaxed on their evidence. A model fits them as closely as a resonance, so that no bound of its error is known.
+    Noise estimated from the scatter of the lines does not reveal the cause of a misfit either.
     """
     experiment_set = collect_periodic_experiments(recordings)
     return bool(experiment_set.experiments) and all(experiment.periods > 1 for experiment in experiment_set.experiments)

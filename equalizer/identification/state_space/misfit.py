@@ -26,9 +26,10 @@ class Misfit:
     error: float
     """Root mean square of model - estimate in excess of the noise, relative to the response's; 0 where the residual is
     noise."""
-    upper_bound: float
+    upper_bound: float | None
     """Upper 95 % bound of the misfit that the noise may hide, also relative to the response; accounts for the scatter
-    of the noise and of its estimate, and for the degrees of freedom that the fit used. Not below `error`."""
+    of the noise and of its estimate, and for the degrees of freedom that the fit used. Not below `error`. None where
+    the lines contain transients or leakage, of which no bound is known (set by `identify_recordings`)."""
     cost: float
     """Squared difference over noise variance, mean over all entries of the lines: about 1 where the residual is
     noise."""

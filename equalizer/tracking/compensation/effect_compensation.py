@@ -47,9 +47,9 @@ MIN_SPEED_AMPLITUDE_MPS = 1e-9
 """Least velocity amplitude (m/s) in the identification, assumed for an axis that did not move: keeps the describing
 function finite."""
 
-ROTATION_TOLERANCE = 1e-3
-"""Largest deviation of an output matrix from a rotation at which it counts as one, because cosines in a model file are
-rounded; the motion is then wrong by no more. Chosen."""
+OUTPUT_TOLERANCE = 1e-3
+"""Largest deviation of an output matrix, relative to its largest entry, from one that measures the driven axes alone at
+which it counts as such, because cosines in a model file are rounded; the motion is then wrong by no more. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,20 +119,22 @@ def convert_motion_to_axes(motion: PlannedMotion, physics: MechanicalModel) -> P
 
 def compute_channels_to_axes(physics: MechanicalModel, axis_count: int) -> FloatArray:
     """Compute the matrix (axis_count, axis_count) by which a row of samples of the response channels is multiplied to
-    give the motion along the driven axes. Where the responses measure rotated axes, it rotates them back. Elsewhere it
-    reverses the sign of an axis where the diagonal of the product of output matrix and driven axes is negative. It is
-    the identity where that product has fewer rows or columns than axis_count."""
+    give the motion along the driven axes. Where the responses measure these axes alone, rotated or scaled, it is the
+    inverse of their gains. Elsewhere it reverses the sign of an axis where the diagonal of the product of output matrix
+    and driven axes is negative. It is the identity where that product has fewer rows or columns than axis_count."""
     driven_axes = compute_driven_axes(physics)
+    axis_gains = physics.output @ np.linalg.pinv(driven_axes.T)
+    tolerance = OUTPUT_TOLERANCE * float(np.abs(physics.output).max())
+    if (
+        axis_gains.shape == (axis_count, axis_count)
+        and np.linalg.svd(axis_gains, compute_uv=False)[-1] > tolerance
+        and np.allclose(axis_gains @ driven_axes.T, physics.output, rtol=0, atol=tolerance)
+    ):
+        return np.asarray(np.linalg.inv(axis_gains).T)
     channel_gains = physics.output @ driven_axes
     if min(channel_gains.shape) < axis_count:
         return np.eye(axis_count)
-    signs = np.where(np.diagonal(channel_gains)[:axis_count] < 0, -1.0, 1.0)
-    is_rotation = (
-        channel_gains.shape == (axis_count, axis_count)
-        and np.allclose(channel_gains @ channel_gains.T, np.eye(axis_count), atol=ROTATION_TOLERANCE)
-        and np.allclose(channel_gains @ driven_axes.T, physics.output, atol=ROTATION_TOLERANCE)
-    )
-    return np.asarray(channel_gains if is_rotation else np.diag(signs))
+    return np.diag(np.where(np.diagonal(channel_gains)[:axis_count] < 0, -1.0, 1.0))
 
 
 def find_effect_axes(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:

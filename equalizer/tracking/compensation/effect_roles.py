@@ -43,7 +43,7 @@ SCALING_EFFECTS, TIMING_EFFECTS = ("force_gain",), ("amplifier_lag", "transport_
 """Effects that scale the added forces, and effects that determine by how much they are advanced (`compute_lead_s`)."""
 
 
-def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
+def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...]) -> str:
     """Explain why an effect is not compensated, as a clause for the user; empty for a compensated effect. inputs:
     channels of the commands, by which a discovered law names the axes. Raises KeyError for an effect that is not in the
     catalogue."""

@@ -26,6 +26,14 @@ def filter_to_band(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[fl
     return filtered
 
 
+def remove_trend(samples: FloatArray) -> FloatArray:
+    """Subtract from each channel of samples (N, channels), N >= 2, the straight line through it (least squares), such
+    as the offset and the drift of a sensor, which `filter_to_band` would ring with at the ends."""
+    position = np.linspace(-1.0, 1.0, len(samples))[:, np.newaxis]
+    slope = (position * samples).sum(axis=0) / (position**2).sum()
+    return np.asarray(samples - samples.mean(axis=0) - slope * position)
+
+
 def compute_band_gain(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatArray:
     """Compute the gain of the band pass, (lines,): 1 in the band, 0 outside its edges. A band from 0 Hz has no lower
     edge."""

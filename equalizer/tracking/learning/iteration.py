@@ -19,7 +19,7 @@ from enum import Enum
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.feedforward.band_pass import filter_to_band
+from equalizer.tracking.feedforward.band_pass import filter_to_band, remove_trend
 
 InverseOperator = Callable[[FloatArray], FloatArray]
 """Linear inverse of the device: from reference motion (N, p) to forces (N, m), in N, with N rows in time each."""
@@ -80,8 +80,9 @@ class IterationSettings:
         return self.compute_residual(self.extract_band(self.reference))
 
     def extract_band(self, samples: FloatArray) -> FloatArray:
-        """Extract the part of samples (N, channels) within the band; samples begin and end at rest, or are noise."""
-        return filter_to_band(samples, self.sample_rate_hz, self.band_hz)
+        """Extract the part of samples (N, channels) within the band; samples begin and end at rest, or are noise,
+        except for the sensor's offset and drift, which are removed first."""
+        return filter_to_band(remove_trend(samples), self.sample_rate_hz, self.band_hz)
 
     @property
     def degrees_of_freedom(self) -> float:
@@ -211,9 +212,8 @@ def estimate_repeat_noise(measured: FloatArray, settings: IterationSettings) -> 
 
 
 def estimate_rest_noise(rest_record: FloatArray, settings: IterationSettings) -> float:
-    """Estimate the noise of a play: rms in the band of a record (n, p) during which no force was commanded; the mean is
-    removed first."""
-    return rms(settings.extract_band(rest_record - rest_record.mean(axis=0)))
+    """Estimate the noise of a play: rms in the band of a record (n, p) during which no force was commanded."""
+    return rms(settings.extract_band(rest_record))
 
 
 def rms(samples: FloatArray) -> float:

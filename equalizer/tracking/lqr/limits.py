@@ -61,8 +61,7 @@ def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -
     one has, ValueError as `find_force_peaks`."""
     peaks = find_force_peaks(forces, cap_n)
     if not peaks.is_under_cap:
-        # Rounded down, so that the printed factor still fits.
-        scale = np.floor(peaks.largest_scale * 1e4) / 1e4
+        scale = round_scale_down(peaks.largest_scale)
         raise ForceLimitError(
             f"the forces reach {peaks.peak_n:.3g} N at {peaks.peak_row / sample_rate_hz:.3f} s, above the cap of "
             f"{peaks.cap_n:g} N ({peaks.share_above:.1%} of the time above it); nothing was clipped. The trajectory "
@@ -70,6 +69,12 @@ def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -
             peaks,
         )
     return peaks
+
+
+def round_scale_down(scale: float) -> float:
+    """Round a factor above 0 down to four significant digits, so that it still fits when it is printed."""
+    unit = 10.0 ** (np.floor(np.log10(scale)) - 3)
+    return float(np.floor(scale / unit) * unit)
 
 
 def require_cap(cap_n: float) -> float:

@@ -50,6 +50,7 @@ class ReproducedModel:
         """Convert to the summary for the report. name: of its recording; underscores become blanks."""
         quality = self.model.quality
         assert quality is not None, "every model that is kept or made here has one"
+        assert quality.expected_error is not None, "every sweep has two counted periods"
         return UsedModel(name.replace("_", " "), quality.expected_error, quality.held_out_error, quality.held_out_noise)
 
 

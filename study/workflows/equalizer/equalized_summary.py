@@ -1,7 +1,7 @@
 """Summary of `hapteq equalize`: predicted accuracy of the accelerations that the computed forces produce.
 
-Predicted errors of accelerations are rms errors in the band, relative to the rms of the reference trajectory, the
-accelerations that the device is to reproduce, in that band.
+Predicted errors of accelerations are rms errors in the band or, under an active cap, at all frequencies, relative to
+the rms of the reference trajectory, the accelerations that the device is to reproduce, in the band.
 """
 
 from typing import Any
@@ -125,8 +125,8 @@ def _format_quality_lines(equalized: EqualizedTrajectory) -> list[str]:
 
 
 def get_predicted_error(equalized: EqualizedTrajectory) -> float:
-    """Return the relative rms error that the model predicts; under an active cap that of the capped forces
-    (`TrackingLoss.error_capped`)."""
+    """Return the relative rms error that the model predicts, in the band; under an active cap that of the capped forces
+    at all frequencies (`TrackingLoss.error_capped`)."""
     loss = equalized.feedforward.loss
     return equalized.feedforward.error if loss is None else loss.error_capped
 
@@ -138,7 +138,8 @@ def _format_prediction_line(equalized: EqualizedTrajectory) -> str:
     cap_text = ""
     if loss is not None:
         cap_text = (
-            f" under the cap, {100 * loss.error_free:.2f} % without it (clipping would have given "
+            f", errors at all frequencies counted, under the cap, {100 * loss.error_free:.2f} % without it (clipping "
+            "would have given "
             f"{100 * loss.error_clipped:.2f} %)"
         )
     return (

@@ -115,7 +115,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     except ValueError as error:
         raise _make_error(f"{error}.") from error
     write_identified_model(plan.out, model)
-    unremoved_effects = () if physics is None else explain_unremovable_effects(physics)
+    unremoved_effects = () if physics is None else explain_unremovable_effects(physics, recordings[0].command.channels)
     return IdentifiedDevice(
         plan,
         recordings,
@@ -140,7 +140,9 @@ def _assess_quality(
         None if held_out_test is None else (held_out_test.error, held_out_test.noise, held_out_test.seconds)
     )
     remark_sentences = tuple(format_sentence(remark) for remark in remarks)
-    return summarise_quality(misfit.error, identified.scatter, held_out_figures, remark_sentences, misfit.upper_bound)
+    return summarise_quality(
+        misfit.error, identified.scatter, held_out_figures, remark_sentences, identified.misfit.upper_bound
+    )
 
 
 def require_new_output(out_path: Path) -> None:
@@ -175,7 +177,7 @@ def _add_provenance(
         "input": "excitation" if plan.with_spring else "command",
         # None: playback compensates the subtracted effects fully, because the model contains no equivalent of them.
         "amplitude_n": _find_peak_amplitude_n(recordings) if physics is None else None,
-        "freed_of": [] if physics is None else list_removable_effects(physics),
+        "freed_of": [] if physics is None else list_removable_effects(physics, recordings[0].command.channels),
     }
     return replace(model, place_m=_find_common_place(recordings), provenance=provenance)
 
@@ -223,14 +225,26 @@ def _use_excitation_as_input(recording: Recording) -> Recording:
 
 def _find_common_place(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:
     """Find the position of the handle (x, y, z; m) in the first recording that states it; None if none does. Raises
-    ValueError if the places differ by more than `SAME_PLACE_TOLERANCE_M`."""
-    places = [recording.meta["place_m"] for recording in recordings if recording.meta.get("place_m") is not None]
+    ValueError if a place is not three numbers, or the places differ by more than `SAME_PLACE_TOLERANCE_M`."""
+    places = [
+        _read_place(recording.meta["place_m"]) for recording in recordings if recording.meta.get("place_m") is not None
+    ]
     if not places:
         return None
-    if np.ptp(np.array(places, dtype=float), axis=0).max() > SAME_PLACE_TOLERANCE_M:
+    if np.ptp(np.array(places), axis=0).max() > SAME_PLACE_TOLERANCE_M:
         raise ValueError("the recordings were made at different places; identify one model per place")
-    x, y, z = (float(component) for component in places[0])
-    return x, y, z
+    return places[0]
+
+
+def _read_place(value: object) -> tuple[float, float, float]:
+    """Read a position (x, y, z; m) from a recording's meta. Raises ValueError unless it is three finite numbers."""
+    try:
+        place = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        place = np.empty(0)
+    if place.shape == (3,) and np.isfinite(place).all():
+        return float(place[0]), float(place[1]), float(place[2])
+    raise ValueError(f"place_m of a recording is {value!r}; it must be three numbers, x, y and z in m")
 
 
 def _make_error(explanation: str) -> StudyError:

@@ -19,7 +19,7 @@ from equalizer.tracking.feedforward.baselines import make_static_gain_inverse
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY, TRANSIENT, Trajectory, require_rate
 from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.lqr.contact import ContactSolutions, prepare_causal_start
-from equalizer.tracking.lqr.limits import ForceLimitError, require_under_cap
+from equalizer.tracking.lqr.limits import ForceLimitError, require_under_cap, round_scale_down
 from equalizer.tracking.lqr.padding import Padding, compute_band_error
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 from study.devices.clock import RealClock, VirtualClock
@@ -130,11 +130,9 @@ def play_contact(
 
 def _normalise(normal: Vector) -> FloatArray:
     """Scale the normal (3,) to length 1. Raises WrongUseError for a length of zero or that is not finite."""
-    length = float(np.linalg.norm(normal))
-    if not (np.isfinite(length) and length > 0):
-        raise WrongUseError(
-            "This is no normal", f"--normal is {' '.join(f'{entry:g}' for entry in normal)}.", "Such as --normal 0 0 1."
-        )
+    if not 0 < (length := float(np.linalg.norm(normal))) < np.inf:
+        normal_text = " ".join(f"{entry:g}" for entry in normal)
+        raise WrongUseError("This is no normal", f"--normal is {normal_text}.", "Such as --normal 0 0 1.")
     return np.asarray(normal, dtype=np.float64) / length
 
 
@@ -175,15 +173,16 @@ def _compute_gain_forces(model: IdentifiedModel, reference: FloatArray) -> Float
 
 
 def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
-    """Return forces (N, 3), N, unchanged. Raises StudyError, with the largest possible --scale, above the cap."""
+    """Return forces (N, 3), N, unchanged. Raises StudyError, with the largest possible --scale above the cap."""
     try:
         require_under_cap(forces, plan.cap_n, rate_hz)
     except ForceLimitError as error:
-        max_scale = np.floor(1e3 * plan.scale * error.peaks.largest_scale) / 1e3
-        raise _make_play_error(
-            f"The forces would reach {error.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
-            f"Give --scale {max_scale:g} or less, or raise --cap for a device that no hand holds.",
-        ) from error
+        happened = f"The forces would reach {error.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N."
+        scale_text = f"--scale {round_scale_down(plan.scale * error.peaks.largest_scale):g}"
+        advice = f"Give {scale_text} or less, or raise --cap for a device that no hand holds."
+        raise _make_play_error(happened, advice) from error
+    except ValueError as error:
+        raise _make_play_error(f"{plan.transient.name}: {error}.", "Correct what is named.") from error
     return forces
 
 
@@ -231,10 +230,11 @@ def _make_settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[Floa
 
 
 def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
-    """Play forces (N, 3), N, and return the measured acceleration, (N, 3) in m/s^2. on_share: called with 0 to 1."""
+    """Play forces (N, 3), N, and return the measured acceleration, (N, 3) in m/s^2, less its mean at rest before."""
     rest_rows = round(SETTLE_S * device.info.sample_rate_hz)
     padded_forces = np.pad(forces, ((rest_rows, rest_rows), (0, 0)))
-    return read_measured_acceleration(play_forces(device, padded_forces, on_share))[rest_rows : rest_rows + len(forces)]
+    acceleration = read_measured_acceleration(play_forces(device, padded_forces, on_share))
+    return np.asarray(acceleration[rest_rows : rest_rows + len(forces)] - acceleration[:rest_rows].mean(axis=0))
 
 
 def _write_play(play: ContactPlay, models: PlaybackModels) -> None:  # tables, figure and contact.json in a new folder

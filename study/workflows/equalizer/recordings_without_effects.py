@@ -23,8 +23,9 @@ TAIL_SHARE = 0.005
 def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, path: Path) -> tuple[Recording, ...]:
     """Remove the effects of `physics` from the recordings. path: file of the mechanical model, for messages. Raises
     StudyError if no effect can be removed, a recording has no excitation, or `subtract_effects` refuses one."""
-    if not list_removable_effects(physics):
-        reasons = " ".join(explain_unremovable_effects(physics))
+    inputs = recordings[0].command.channels
+    if not list_removable_effects(physics, inputs):
+        reasons = " ".join(explain_unremovable_effects(physics, inputs))
         raise _make_not_removable_error(
             f"{path.name} names no effect that can be subtracted from a recording. {reasons}".rstrip()
         )
@@ -34,18 +35,19 @@ def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, pa
         raise _make_not_removable_error(f"{path.name}: {problem}.") from problem
 
 
-def list_removable_effects(physics: MechanicalModel) -> list[str]:
-    """List the removable effects in words, each with its axis and its parameters or law."""
+def list_removable_effects(physics: MechanicalModel, inputs: tuple[str, ...]) -> list[str]:
+    """List the removable effects in words, each with its axis and its parameters or law. inputs: channels of the
+    recordings' commands."""
     return [
         f"{effect.kind}{f' on {effect.axis}' if effect.axis else ''} ({_describe_parameters(effect)})"
         for effect in physics.effects
-        if not explain_not_compensated(effect)
+        if not explain_not_compensated(effect, inputs)
     ]
 
 
-def explain_unremovable_effects(physics: MechanicalModel) -> tuple[str, ...]:
-    """Explain, in a sentence for each, why effects stay in the recordings."""
-    reasons = ((effect.kind, explain_not_compensated(effect)) for effect in physics.effects)
+def explain_unremovable_effects(physics: MechanicalModel, inputs: tuple[str, ...]) -> tuple[str, ...]:
+    """Explain, in a sentence for each, why effects stay in the recordings. inputs: channels of their commands."""
+    reasons = ((effect.kind, explain_not_compensated(effect, inputs)) for effect in physics.effects)
     return tuple(f"{kind}: {reason}." for kind, reason in reasons if reason)
 
 

@@ -24,6 +24,15 @@ def test_local_averages_under_a_long_bound_do_not_blunt_what_rings(plants, synth
     assert np.linalg.norm(error) < 0.01 * np.linalg.norm(truth)
 
 
+def test_a_single_short_period_states_no_error(plants, synthetic):
+    """The model fits the transient as closely as the device: the true error is several times the misfit."""
+    settings = IdentificationSettings(order=8, draws=3, longer_horizons=(0,), record_horizons=())
+    found = identify_recordings(synthetic.sweeps(plants, 4.5, 37.0, 2.0, periods=1), settings, smooth=False)
+    assert found.identified.misfit.upper_bound is None
+    assert found.identified.expected_error is None
+    assert ("expected error", "not known") in found.identified.summary().rows
+
+
 def test_the_expected_error_of_local_averages_is_that_on_the_lines_themselves(plants, synthetic):
     """An order that is too low: the averages, too, are smooth, and the model may fit them closely."""
     settings = IdentificationSettings(order=8, draws=3, longer_horizons=(0,), record_horizons=())

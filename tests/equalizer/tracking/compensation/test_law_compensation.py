@@ -204,6 +204,16 @@ def test_the_cosines_of_a_turned_sensor_may_be_rounded():
     assert np.abs(by_sensor - along_axes).max() < 1e-3 * np.abs(along_axes - PUSHED).max()
 
 
+@pytest.mark.parametrize("gains", [2.0 * TURNED, TURNED * [1.0, 0.5, 4.0], np.diag([1.0, -3.0, 1.0])])
+@pytest.mark.parametrize("identified_with_n", [None, 0.5])
+def test_the_motion_of_a_sensor_that_is_turned_and_scaled_is_that_of_the_axes(gains, identified_with_n):
+    straight = physics(found("-5.0*vy*abs(vy) - 30.0*y"))
+    along_axes = compensate(PUSHED, WANTED, MODEL, straight, identified_with_n).forces
+    scaled, scaled_model = replace(straight, output=gains), replace(MODEL, C=gains @ MODEL.C, D=gains @ MODEL.D)
+    by_sensor = compensate(PUSHED, WANTED @ gains.T, scaled_model, scaled, identified_with_n).forces
+    assert by_sensor == pytest.approx(along_axes, abs=1e-9)
+
+
 def test_an_axis_is_found_by_its_command_where_responses_have_another_order():
     effect = found("-5.0*vy")
     assert find_effect_axes(effect, ("fx", "fy"), ("ay", "ax")) == (1,)

@@ -153,6 +153,18 @@ def test_recordings_of_two_places_are_no_model_of_one(folder, plants, tmp_path):
     assert "different places; identify one model per place" in said.happened
 
 
+@pytest.mark.parametrize("place_m", [[0.0, 0.1], {"x": 0.0}, [0.0, 0.0, "left"], [[0.0, 0.0, 0.0]]])
+def test_a_place_that_is_none_is_named(plants, tmp_path, place_m):
+    commands = np.tile(plants.multisine(4.5, 37.0, seconds=2.0), (2, 1))
+    for number in range(3):
+        segments = (Segment(0, len(commands), "multisine", 1.5, 2000),)
+        recording = recorded(plants, np.roll(commands, number, axis=1), segments, place_m=place_m)
+        write_recording(tmp_path / f"{number}.h5", recording)
+    paths = tuple(tmp_path / f"{number}.h5" for number in range(3))
+    said = refused(IdentifyPlan(paths, tmp_path / "m.h5", order=4, smooth=False))
+    assert "lace_m of a recording is" in said.happened and "three numbers, x, y and z in m" in said.happened
+
+
 @pytest.mark.slow
 def test_the_spring_can_only_be_taken_in_where_the_excitation_is_known(folder, plants, tmp_path):
     write_recording(tmp_path / "total.h5", replace(swept(plants), excitation=None))

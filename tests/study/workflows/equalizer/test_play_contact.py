@@ -97,6 +97,25 @@ def test_forces_above_the_cap_are_refused_with_the_scale_that_fits(folder, tmp_p
     assert np.linalg.norm(play_contact(plan, lambda _: None).equalized.forces, axis=1).max() <= 3.0
 
 
+@pytest.mark.parametrize("scale", [1e5, 1e6])
+def test_the_scale_that_fits_is_never_nought(folder, tmp_path, scale):
+    write_trajectory(tmp_path / "micrometres.csv", tap(6e6))
+    refused = refusal(folder, tmp_path, transient=tmp_path / "micrometres.csv", scale=scale)
+    assert 1e-8 < float(refused.do_now.split("--scale ")[1].split(" ")[0]) < 1e-5
+
+
+def test_a_cap_without_end_is_refused(folder, tmp_path):
+    assert "cap_n is inf; it must be a positive number" in refusal(folder, tmp_path, cap_n=np.inf).happened
+
+
+def test_an_offset_of_the_sensor_is_no_part_of_what_was_measured(folder, tmp_path, done, monkeypatch):
+    found, _ = done
+    read = play_contact_module.read_measured_acceleration
+    monkeypatch.setattr(play_contact_module, "read_measured_acceleration", lambda result: read(result) + 5.0)
+    plan = ContactPlan(folder / "model.h5", folder / "tap.csv", NORMAL, tmp_path / "out")
+    assert play_contact(plan, lambda _: None).equalized.error == pytest.approx(found.equalized.error)
+
+
 def test_a_model_from_a_hand_is_not_played(folder, tmp_path):
     model = read_identified_model(folder / "model.h5")
     held = replace(model, provenance={**model.provenance, "hand": ["held"]})

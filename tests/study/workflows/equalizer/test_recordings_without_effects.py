@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from equalizer.laws.law import parse_law
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -18,7 +19,11 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
-from study.workflows.equalizer.recordings_without_effects import find_excitation_band
+from study.workflows.equalizer.recordings_without_effects import (
+    explain_unremovable_effects,
+    find_excitation_band,
+    list_removable_effects,
+)
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -118,6 +123,13 @@ def test_what_stays_in_the_recordings_is_told(folder, tmp_path):
     told = identify_model(plan, lambda share: None).remarks
     (said,) = [sentence for sentence in told if sentence.startswith("Not subtracted from the recordings: ")]
     assert "cogging: amplitude and pitch" in said
+
+
+def test_a_law_is_removable_where_it_names_the_axes_of_the_recording():
+    law = ModelEffect("discovered_law", "x", {}, parse_law("-5.0*vx*abs(vx)", "force", "x"))
+    for inputs, is_removable in ((("fy", "fx"), True), (("u",), True), (("fy", "fz"), False)):
+        assert bool(list_removable_effects(mechanical(law), inputs)) is is_removable
+        assert bool(explain_unremovable_effects(mechanical(law), inputs)) is not is_removable
 
 
 def test_an_effect_on_an_axis_that_is_not_there_is_refused(folder, tmp_path):

@@ -63,6 +63,7 @@ def test_what_the_cap_costs_is_reported_in_one_figure(plan):
     assert sum(" error " in line for line in lines) == 1
     figures = [100 * capped[f"error_{kind}"] for kind in ("capped", "free", "clipped")]
     assert "error {:.2f} % of the wanted acceleration".format(*figures) in lines[1]
+    assert "within 5 to 35 Hz, errors at all frequencies counted, under the cap, " in lines[1]
     assert "under the cap, {1:.2f} % without it (clipping would have given {2:.2f} %)".format(*figures) in lines[1]
 
 
