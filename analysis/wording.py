@@ -3,6 +3,7 @@
 Numbers have a true minus sign (U+2212) and a fixed number of decimals; an en dash stands for a missing number.
 """
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -18,6 +19,8 @@ MISSING = "–"
 """Text for a missing number (en dash)."""
 _MAX_LISTED_ITEMS = 12
 """Largest number of items that a sentence lists. Chosen."""
+_LEAST_SIZE = 1e-9
+"""Absolute value up to which a number counts as 0 when its decimals are chosen: the rounding of a sum. Chosen."""
 
 
 def typeset(formatted: str) -> str:
@@ -39,10 +42,23 @@ def format_signed(value: float, digits: int = 2) -> str:
     return typeset(f"{value:+.{digits}f}")
 
 
-def mark_cut(value: float | None, is_cut: bool, digits: int = 2) -> str:
-    """Format a threshold, followed by "cut" where the largest permitted level (cap) limited it, so that it is censored;
-    a dash for None."""
-    return f"{format_number(value, digits)} cut" if is_cut and value is not None else format_number(value, digits)
+def choose_decimals(*values: float | None, least: int = 2, significant: int = 2) -> int:
+    """Choose the number of decimals for values that are read together: `least`, or more where the largest of them would
+    otherwise have fewer than `significant` significant digits."""
+    largest = max((abs(value) for value in values if value is not None and math.isfinite(value)), default=0.0)
+    return max(least, significant - 1 - math.floor(math.log10(largest))) if largest > _LEAST_SIZE else least
+
+
+def format_newtons(value: float | None, least: int = 2) -> str:
+    """Format a force in N, without its unit, with `least` decimals, below 0.1 N with two significant digits at least; a
+    dash for None."""
+    return format_number(value, choose_decimals(value, least=least))
+
+
+def mark_cut(value: float | None, is_cut: bool) -> str:
+    """Format a threshold in N, followed by "cut" where the largest permitted level (cap) limited it, so that it is
+    censored; a dash for None."""
+    return f"{format_newtons(value)} cut" if is_cut and value is not None else format_newtons(value)
 
 
 def format_count(value: int | None) -> str:

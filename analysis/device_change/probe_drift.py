@@ -38,6 +38,9 @@ RIVAL_RATIO = 2.0
 deviates from the law, the ratio of grip to gain is 1.2 to 1.7 when the hand's impedance grows by half."""
 DELAY_ITERATIONS = 3
 """Gauss-Newton steps for the delay, of which the response is a nonlinear function."""
+LEAST_NOISE_SHARE = 1e-9
+"""Smallest noise, relative to the strongest acceleration: first probes without any difference, as of a replayed
+recording, have none to divide by. Chosen, far below the noise of a sensor."""
 Z_LIMIT = 4.0
 """Standard errors beyond which a change is significant; chosen by hand, against false alarms."""
 
@@ -149,11 +152,11 @@ def _compare_probes(
     )
     product = first_driven * driven_acceleration[newest]
     scatter = driven_acceleration[:first_count] - average_first(driven_acceleration, levels_n[:first_count])
-    noise = float(np.sqrt(np.mean(np.abs(scatter) ** 2) * FIRST_PROBES / (FIRST_PROBES - 1) * (1 + 1 / FIRST_PROBES)))
-    scale = np.abs(first_force) / np.abs(product) * noise
-    known_friction = ((first_acceleration * shape[newest] - acceleration[newest] * first_shape) * friction_n).sum(
-        axis=2
-    )
+    noise = np.sqrt(np.mean(np.abs(scatter) ** 2) * FIRST_PROBES / (FIRST_PROBES - 1) * (1 + 1 / FIRST_PROBES))
+    least_noise = LEAST_NOISE_SHARE * np.abs(driven_acceleration).max()
+    scale = np.abs(first_force) / np.abs(product) * max(noise, least_noise)
+    shape_difference = first_acceleration * shape[newest] - acceleration[newest] * first_shape
+    known_friction = (shape_difference * friction_n).sum(axis=2)
     difference = (force[newest] * first_driven - first_force * driven_acceleration[newest] - known_friction) / product
     columns = _compute_columns(
         w,
@@ -237,16 +240,8 @@ def _select_causes(comparison: _Comparison, time_s: float, causes: tuple[str, ..
             cause = next(cause for cause, cause_parameters in CAUSES.items() if parameter in cause_parameters)
             initial_n = float(comparison.friction_n[axis]) if parameter == "friction" else None
             axis_name = "" if cause == "delay" else AXES[axis]
-            yield Drift(
-                cause,
-                parameter,
-                axis_name,
-                time_s,
-                float(value),
-                inflated_error,
-                initial_n,
-                _find_rivals(cause, best_causes, misfits),
-            )
+            rivals = _find_rivals(cause, best_causes, misfits)
+            yield Drift(cause, parameter, axis_name, time_s, float(value), inflated_error, initial_n, rivals)
 
 
 def _compute_inflation(comparison: _Comparison, causes: tuple[str, ...]) -> float:

@@ -32,6 +32,10 @@ BREAK_AWAY_LENGTHS_M = tuple(np.geomspace(2e-6, 5e-5, 8).tolist())
 too large a level of friction, too small a length too small a level: by some 10 % where lengths differ by a factor of
 1.6, by 40 % for a factor of 2.5. Chosen by hand."""
 
+LEAST_RESPONSE_MPS2 = 1e-9
+"""Amplitude of a driven line's acceleration up to which a sensor counts as not responding, m/s²: the spectrum of a
+constant reading has only rounding, far below; the noise of an accelerometer lies far above. Chosen by hand."""
+
 INTEGRATED_PERIODS = 3
 """Number of periods over which Dahl's law is integrated; the last is used. Its initial state decays within a few
 break-away lengths of motion, so that the force is then periodic. Chosen by hand."""
@@ -56,8 +60,8 @@ class ProbeLines:
 
 def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
     """Compute the spectra of the mean period of a probe; of its first segment where the recording has segments.
-    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples of command,
-    excitation or response are missing."""
+    period_s: period of the multisine. Raises ValueError where less than a period was recorded, samples of command,
+    excitation or response are missing, or the acceleration along a driven axis does not respond."""
     period_samples = round(period_s * recording.sample_rate_hz)
     # With a virtual spring, the command also holds the spring's force, which would count as driven.
     excitation_signal = recording.command if recording.excitation is None else recording.excitation
@@ -76,9 +80,12 @@ def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
     if recording.position is not None and recording.position.samples.shape[1] == force_n.shape[1]:
         position_m = _compute_mean_spectrum(recording.position.samples[start:stop], period_samples)
     excitation_amplitude = np.abs(excitation)
+    driven = excitation_amplitude > LEAST_DRIVEN_SHARE * excitation_amplitude.max(axis=0)
+    if (np.abs(acceleration_mps2[driven]) <= LEAST_RESPONSE_MPS2).any():
+        raise ValueError("its acceleration does not follow the force: check the accelerometer and its cable")
     return ProbeLines(
         frequency_hz=np.arange(1, len(force_n) + 1) / period_s,
-        driven=excitation_amplitude > LEAST_DRIVEN_SHARE * excitation_amplitude.max(axis=0),
+        driven=driven,
         force_n=force_n,
         acceleration_mps2=acceleration_mps2,
         position_m=position_m,

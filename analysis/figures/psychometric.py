@@ -34,6 +34,7 @@ from analysis.psychophysics.hierarchy.observed_shares import (
     compute_person_shares,
     evaluate_person_curve,
 )
+from analysis.wording import format_newtons
 from protocols.procedure.staircase import to_db
 
 _ROW_HEIGHT_IN = 2.2
@@ -102,7 +103,9 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
         axes.set_xscale("log")
         set_newton_ticks(axes.xaxis, low_n, high_n)
         axes.set_xlim(low_n, high_n)
-        threshold_text = "above the cap" if estimate.above_cap[index] else f"{estimate.thresholds_n[index]:.2f} N"
+        threshold_text = (
+            "above the cap" if estimate.above_cap[index] else f"{format_newtons(estimate.thresholds_n[index])} N"
+        )
         axes.set_title(f"{fit.frequencies_hz[index]:g} Hz: {threshold_text}", fontsize=10, loc="left")
     label_panel_axes(panels, len(answered_frequencies), "Level (N)", "Right (%)")
     cap_handle = Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {cap_n:g} N")

@@ -27,6 +27,7 @@ from analysis.figures.style import (
 )
 from analysis.psychophysics.runs import Run
 from analysis.psychophysics.thresholds import RunEnd, Threshold, compute_run_threshold
+from analysis.wording import format_newtons
 from protocols.definition.staircase_rule import StaircaseRule
 
 _PANEL_ROW_HEIGHT_IN = 2.2
@@ -97,7 +98,7 @@ def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule) -> None:
 def _describe_outcome(threshold: Threshold) -> str:
     """Describe how a run ended, at the end of its panel's title: the threshold in N, or why there is none."""
     if threshold.threshold_n is not None:
-        return f": {threshold.threshold_n:.2f} N{', cut by the cap' if threshold.censored else ''}"
+        return f": {format_newtons(threshold.threshold_n)} N{', cut by the cap' if threshold.censored else ''}"
     return " (stopped by the trial limit)" if threshold.ended is RunEnd.TRIAL_LIMIT else " (not complete)"
 
 

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#6B6B6B"
@@ -107,7 +108,8 @@ def set_newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:
 
 def set_ratio_ticks(axis: Axis, low: float, high: float) -> None:
     """Set ticks from low to high (both > 0) on a logarithmic axis, at the multiples of powers of ten of
-    `_TICK_MULTIPLES`, fewer for more decades. Call after the scale is set."""
+    `_TICK_MULTIPLES`, fewer for more decades; where there are fewer than two, at equal distances. Call after the scale
+    is set."""
     decades = np.log10(high / low)
     tick_multiples = next(
         candidate_multiples for most_decades, candidate_multiples in _TICK_MULTIPLES if decades <= most_decades
@@ -115,6 +117,9 @@ def set_ratio_ticks(axis: Axis, low: float, high: float) -> None:
     exponents = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     candidate_values = [multiple * 10.0**exponent for exponent in exponents for multiple in tick_multiples]
     tick_values = [value for value in candidate_values if low <= value <= high]
+    if len(tick_values) < 2:
+        even_values = MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(low, high)
+        tick_values = [float(value) for value in even_values if low <= value <= high]
     axis.set_ticks(tick_values, labels=[f"{value:.10g}" for value in tick_values])
     axis.set_ticks([], minor=True)
 

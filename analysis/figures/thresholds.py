@@ -4,6 +4,8 @@ Thresholds that the cap cut (censored) are hollow with an arrow upwards; runs th
 threshold and are drawn above the cap.
 """
 
+from functools import partial
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,7 +23,7 @@ from analysis.figures.style import (
     draw_no_data_note,
     style_axes,
 )
-from analysis.psychophysics.comparisons import Comparisons
+from analysis.psychophysics.comparisons import ComparisonInterval, Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
 from equalizer.signals.signal import FloatArray
 
@@ -31,15 +33,18 @@ _LARGEST_LEGEND = 24
 """Largest number of participants for which the legend lists each one; with more it lists none. Chosen."""
 _STOPPED_RUN_HEIGHT = 1.07
 """Height at which stopped runs are drawn, as a multiple of the cap: chosen between the cap and the end of the axis."""
+_AXIS_TOP = 1.15
+"""Upper end of the axis, as a multiple of the cap. Chosen."""
 
 
 def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> Figure:
-    """Draw each participant's thresholds, joined by a line, and the group mean with its comparison interval.
+    """Draw each participant's thresholds, joined by a line, and the group mean with its comparison interval, with an
+    arrowhead at an end of the axis that it passes.
 
     table: thresholds in newtons; where it has no participant, the figure contains a note. comparisons: of the same
     table; without intervals, means are drawn alone. cap_n: largest force of the study (N), a dashed line.
     """
-    legend_handles = _make_legend_handles(table, comparisons)
+    legend_handles = _make_legend_handles(table, comparisons, cap_n)
     figure = create_figure(PAGE_WIDTH_IN, choose_height_in(legend_handles, 4.2))
     if not table.subjects:
         return draw_no_data_note(figure, "There is no completed run to draw.")
@@ -55,10 +60,10 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     offsets = np.linspace(-spread, spread, len(table.subjects))
     _draw_participants(axes, table, offsets)
     _draw_stopped_runs(axes, table, offsets, cap_n)
-    _draw_means(axes, table, comparisons)
+    _draw_means(axes, table, comparisons, cap_n)
     axes.set_xticks(range(len(table.frequencies_hz)), [f"{frequency_hz:g}" for frequency_hz in table.frequencies_hz])
     axes.set_xlim(-0.6, len(table.frequencies_hz) - 0.4)
-    axes.set_ylim(0, 1.15 * cap_n)
+    axes.set_ylim(0, _AXIS_TOP * cap_n)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
     figure.legend(handles=legend_handles, loc="outside right upper", fontsize=8.5, frameon=False)
@@ -102,8 +107,9 @@ def _draw_stopped_runs(axes: Axes, table: ThresholdTable, offsets: FloatArray, c
                           color=choose_colour(person), markerfacecolor="none")  # fmt: skip
 
 
-def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
-    """Draw the mean of the thresholds at each frequency that has any, with its comparison interval if it has one."""
+def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> None:
+    """Draw the mean of the thresholds at each frequency that has any, with its comparison interval if it has one, and
+    an arrowhead at each end of the axis that the interval passes."""
     intervals = {interval.name: interval for interval in comparisons.intervals}
     for position, (name, thresholds) in enumerate(table.group_by_frequency().items()):
         measured_thresholds = [threshold for threshold in thresholds if threshold is not None]
@@ -113,43 +119,38 @@ def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> 
         half_width = intervals[name].upper - mean if name in intervals else None
         axes.errorbar(position, mean, yerr=half_width, fmt="_", color=BLACK, markersize=22, markeredgewidth=2.4,
                       elinewidth=1.6, capsize=4, zorder=4)  # fmt: skip
+        for end_n, marker in _list_passed_ends(intervals.get(name), cap_n):
+            axes.plot(position, end_n, marker, color=BLACK, markersize=6, clip_on=False, zorder=4)
 
 
-def _make_legend_handles(table: ThresholdTable, comparisons: Comparisons) -> list[Line2D]:
-    """Make the legend's entries: mean, censored and stopped runs where there are any, and the participants."""
+def _list_passed_ends(interval: ComparisonInterval | None, cap_n: float) -> list[tuple[float, str]]:
+    """List the ends of the axis (N) that an interval passes, each with the marker of an arrowhead; empty without an
+    interval."""
+    if interval is None:
+        return []
+    ends = ((0.0, "v", interval.lower < 0), (_AXIS_TOP * cap_n, "^", interval.upper > _AXIS_TOP * cap_n))
+    return [(end_n, marker) for end_n, marker, is_passed in ends if is_passed]
+
+
+def _make_legend_handles(table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> list[Line2D]:
+    """Make the legend's entries: mean, intervals that pass the axis, censored and stopped runs where there are any, and
+    the participants."""
     confidence_text = f"{100 * comparisons.confidence:g} %"
     coverage_note = ",\nwithout coverage" if table.coverage_warning else ""
     mean_label = f"mean, {confidence_text}\ncomparison interval{coverage_note}" if comparisons.intervals else "mean"
-    handles = [
-        Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0, label=mean_label)
-    ]
+    handle = partial(Line2D, [], [], linewidth=0)
+    handles = [handle(color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, label=mean_label)]
+    if any(_list_passed_ends(interval, cap_n) for interval in comparisons.intervals):
+        handles.append(handle(color=BLACK, marker="v", markersize=6, label="interval passes the\naxis"))
     if table.censored_count:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=GREY,
-                marker=CENSORED_MARKER,
-                linewidth=0,
-                markersize=9,
-                label="cut by the cap\n(hollow marker)",
-            )
-        )
+        label = "cut by the cap\n(hollow marker)"
+        handles.append(handle(color=GREY, marker=CENSORED_MARKER, markersize=9, label=label))
     if any(map(any, table.stopped)):
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=GREY,
-                marker="o",
-                markerfacecolor="none",
-                linewidth=0,
-                label="above the cap: stopped\nby the trial limit",
-            )
-        )
+        label = "above the cap: stopped\nby the trial limit"
+        handles.append(handle(color=GREY, marker="o", markerfacecolor="none", label=label))
     if len(table.subjects) <= _LARGEST_LEGEND:
         handles += [
-            Line2D([], [], color=choose_colour(index), marker=choose_marker(index), linewidth=0, label=subject)
+            handle(color=choose_colour(index), marker=choose_marker(index), label=subject)
             for index, subject in enumerate(table.subjects)
         ]
     return handles

@@ -1,8 +1,7 @@
 """Warnings about the results of a study, as sentences for its report.
 
-They cover runs without a threshold, thresholds censored by the cap, small or unequal samples, performance at chance,
-response bias and its drift, trials that were spoiled (void, presented again), flagged or not measured, lapses in catch
-trials, and direction thresholds below detection. Each `_warn_of_...` returns a paragraph, empty without a finding.
+They cover runs without a threshold, censored thresholds, samples, chance, response bias and its drift, spoiled (void),
+flagged and unmeasured trials, lapses, and detection. Each `_warn_of_...` returns a paragraph, empty without a finding.
 """
 
 import math
@@ -17,7 +16,7 @@ from analysis.psychophysics.detection import find_thresholds_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.threshold_words import select_threshold_words
-from analysis.wording import conjoin, format_signed
+from analysis.wording import conjoin, format_newtons, format_signed
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
@@ -279,7 +278,8 @@ def _warn_of_detection_at_chance(detection: Sequence[Threshold]) -> str:
 
 def _warn_of_direction_below_detection(table: ThresholdTable, detection_table: ThresholdTable) -> str:
     cells = [
-        f"{case.subject} at {case.frequency_hz:g} Hz ({case.direction_n:.2f} N, detected from {case.detection_n:.2f} N)"
+        f"{case.subject} at {case.frequency_hz:g} Hz ({format_newtons(case.direction_n)} N, detected from "
+        f"{format_newtons(case.detection_n)} N)"
         for case in find_thresholds_below_detection(table, detection_table)
     ]
     if not cells:

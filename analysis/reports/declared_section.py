@@ -6,7 +6,7 @@ distinguish it from results chosen afterwards.
 
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
 from analysis.reports.page import Section, Table
-from analysis.wording import MISSING, format_p, format_p_text, format_signed
+from analysis.wording import MISSING, choose_decimals, format_p, format_p_text, format_signed
 
 ANALYSIS_NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
 """Name of each analysis in sentences and tables, by its value in the protocol."""
@@ -121,5 +121,5 @@ def _format_interval(contrast: ContrastResult) -> str:
 
 
 def _choose_decimals(contrast: ContrastResult) -> int:
-    """Choose the number of decimals of a difference: one in dB, two in N."""
-    return 1 if contrast.unit == "dB" else 2
+    """Choose the number of decimals of a difference and its interval: one in dB, two or more in N."""
+    return 1 if contrast.unit == "dB" else choose_decimals(contrast.difference, contrast.lower, contrast.upper)

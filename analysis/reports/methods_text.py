@@ -5,7 +5,7 @@ docs/statistics.md.
 """
 
 from analysis.psychophysics.thresholds import CUT_PROBABILITY
-from analysis.wording import conjoin, typeset
+from analysis.wording import conjoin, format_newtons, typeset
 from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
 from protocols.definition.study_protocol import StudyProtocol
@@ -231,8 +231,8 @@ def describe_levels(settings: DemoSettings | PracticeSettings) -> str:
         return f"{settings.level_n:g} N"
     half_range_ratio = 10.0 ** (settings.rove_db / 40.0)
     return (
-        f"levels drawn evenly in dB from {settings.level_n / half_range_ratio:.2f} "
-        f"to {settings.level_n * half_range_ratio:.2f} N"
+        f"levels drawn evenly in dB from {format_newtons(settings.level_n / half_range_ratio)} "
+        f"to {format_newtons(settings.level_n * half_range_ratio)} N"
     )
 
 

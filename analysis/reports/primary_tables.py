@@ -6,8 +6,9 @@ from `analysis.psychophysics`.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
@@ -18,7 +19,7 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import select_threshold_words
-from analysis.wording import MISSING, conjoin, format_number, format_p, format_p_text, format_signed
+from analysis.wording import MISSING, conjoin, format_newtons, format_number, format_p, format_p_text, format_signed
 
 BOUND_TOLERANCE_LOG = 0.01
 """Distance of ln(standard deviation) from its upper bound, below which the fit counts as ended at the bound. Chosen."""
@@ -167,17 +168,12 @@ def _make_median_table(primary: PrimaryAnalysis) -> Table:
     rows = []
     for median in primary.medians:
         interval_n = format_median_interval(median.lower_n, median.upper_n, median.above_cap)
-        interval_db = format_median_interval(median.lower_db, median.upper_db, median.above_cap, 1)
-        threshold_text = "above the cap" if median.above_cap else format_number(median.newton)
-        rows.append(
-            (
-                f"{median.frequency_hz:g} Hz",
-                threshold_text,
-                interval_n,
-                MISSING if median.above_cap else format_number(median.db, 1),
-                interval_db,
-            )
+        interval_db = format_median_interval(
+            median.lower_db, median.upper_db, median.above_cap, partial(format_number, digits=1)
         )
+        threshold_text = "above the cap" if median.above_cap else format_newtons(median.newton)
+        db_text = MISSING if median.above_cap else format_number(median.db, 1)
+        rows.append((f"{median.frequency_hz:g} Hz", threshold_text, interval_n, db_text, interval_db))
     percent = f"{100 * primary.confidence:g} %"
     return Table(
         caption="Median participant",
@@ -187,13 +183,17 @@ def _make_median_table(primary: PrimaryAnalysis) -> Table:
     )
 
 
-def format_median_interval(lower: float | None, upper: float | None, above_cap: bool, digits: int = 2) -> str:
+def format_median_interval(
+    lower: float | None,
+    upper: float | None,
+    above_cap: bool,
+    format_limit: Callable[[float], str] = format_newtons,
+) -> str:
     """Format the interval of a median threshold. upper: None above the cap. lower: None where there are too few people,
-    or, above the cap, where no lower bound was found."""
+    or, above the cap, where no lower bound was found. format_limit: formats a limit in its unit."""
     if lower is None:
         return "no lower bound" if above_cap else "no interval: too few people"
-    lower_text = format_number(lower, digits)
-    return f"above {lower_text}" if upper is None else f"{lower_text} to {format_number(upper, digits)}"
+    return f"above {format_limit(lower)}" if upper is None else f"{format_limit(lower)} to {format_limit(upper)}"
 
 
 def _make_contrast_table(
@@ -247,12 +247,12 @@ def format_run(run: LikelihoodThreshold) -> tuple[str, str]:
     if run.below:
         threshold_text = "below the levels played"
     else:
-        threshold_text = "above the cap" if run.db is None else format_number(convert_to_newton(run.db))
+        threshold_text = "above the cap" if run.db is None else format_newtons(convert_to_newton(run.db))
     if lower_n is not None and upper_n is not None:
-        return threshold_text, f"{format_number(lower_n)} to {format_number(upper_n)}"
+        return threshold_text, f"{format_newtons(lower_n)} to {format_newtons(upper_n)}"
     if upper_n is not None:
-        return threshold_text, f"below {format_number(upper_n)}"
-    return threshold_text, MISSING if lower_n is None else f"above {format_number(lower_n)}"
+        return threshold_text, f"below {format_newtons(upper_n)}"
+    return threshold_text, MISSING if lower_n is None else f"above {format_newtons(lower_n)}"
 
 
 def _make_person_table(primary: PrimaryAnalysis) -> Table:
@@ -264,7 +264,7 @@ def _make_person_table(primary: PrimaryAnalysis) -> Table:
             (
                 person.subject,
                 *(
-                    "above the cap" if is_above_cap else format_number(threshold_n)
+                    "above the cap" if is_above_cap else format_newtons(threshold_n)
                     for threshold_n, is_above_cap in zip(person.thresholds_n, person.above_cap, strict=True)
                 ),
                 format_number(person.slope),

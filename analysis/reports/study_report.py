@@ -17,7 +17,6 @@ from analysis.reports.methods_text import compose_methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.primary_tables import make_primary_section
 from analysis.reports.study_tables import (
-    make_ellipsoid_table,
     make_group_table,
     make_one_way_table,
     make_pair_table,
@@ -30,6 +29,7 @@ from analysis.reports.supplementary_tables import (
     make_delivery_tables,
     make_detection_run_table,
     make_detection_table,
+    make_ellipsoid_table,
     make_practice_table,
 )
 

@@ -1,20 +1,28 @@
-"""Tables of the report of a threshold study: thresholds, one-way ANOVA, Tukey-Kramer pairs, tests within participants,
-runs, and acceleration ellipses.
+"""Tables of the report of a threshold study: thresholds, one-way ANOVA, Tukey-Kramer pairs, tests within participants
+and runs.
 
 This module only formats values as text; `analysis.psychophysics` computes them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from analysis.psychophysics.bias import CRITERION_DEFINITION
-from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.repeated_trials import VOID_LIMITS_TEXT
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Table
 from analysis.threshold_words import select_threshold_words
-from analysis.wording import MISSING, format_count, format_number, format_p, format_p_text, format_signed, mark_cut
+from analysis.wording import (
+    MISSING,
+    choose_decimals,
+    format_count,
+    format_number,
+    format_p,
+    format_p_text,
+    format_signed,
+    mark_cut,
+)
 
 
 def make_threshold_table(analysis: StudyAnalysis) -> Table:
@@ -53,18 +61,18 @@ def make_group_table(analysis: StudyAnalysis) -> Table:
         [sum(column) for column in zip(*cells, strict=True)]
         for cells in (analysis.table.censored, analysis.table.stopped)
     )
-    rows = []
+    rows, decimals = [], _choose_decimals(analysis)
     for group, cut_count, stop_count in zip(analysis.anova.groups, cut_counts, stop_counts, strict=True):
         interval = intervals.get(group.name)
-        interval_text = f"{format_number(interval.lower)} to {format_number(interval.upper)}" if interval else MISSING
+        limit_texts = [format_number(limit, decimals) for limit in (interval.lower, interval.upper)] if interval else []
         stop_remark = " (without stopped)" if stop_count and group.n else ""
         rows.append(
             (
                 group.name,
                 str(group.n),
                 f"{mark_cut(group.mean, bool(cut_count))}{stop_remark}",
-                format_number(group.sd),
-                interval_text,
+                format_number(group.sd, decimals),
+                " to ".join(limit_texts) or MISSING,
                 str(cut_count),
                 str(stop_count),
             )
@@ -89,6 +97,11 @@ def make_group_table(analysis: StudyAnalysis) -> Table:
     )
 
 
+def _choose_decimals(analysis: StudyAnalysis) -> int:
+    """Choose the number of decimals of spreads and differences between thresholds in N: that of the largest mean."""
+    return choose_decimals(*(group.mean for group in analysis.anova.groups))
+
+
 def _format_coverage_suffix(analysis: StudyAnalysis) -> str:
     """Format the suffix for the name of an interval or effect size that includes cut or stopped runs: its confidence
     does not hold; empty where no run was cut or stopped."""
@@ -108,15 +121,16 @@ def make_one_way_table(analysis: StudyAnalysis) -> Table:
     rows: tuple[tuple[str, ...], ...] = ()
     effect_notes: tuple[str, ...] = ()
     if anova.f is not None and anova.ss_between is not None and anova.df_between:
+        decimals = 2 * _choose_decimals(analysis) - 1  # of squares of forces, N²
         between_cells = (
-            format_number(anova.ss_between, 3),
+            format_number(anova.ss_between, decimals),
             format_count(anova.df_between),
-            format_number(anova.ss_between / anova.df_between, 3),
+            format_number(anova.ss_between / anova.df_between, decimals),
         )
         within_cells = (
-            format_number(anova.ss_within, 3),
+            format_number(anova.ss_within, decimals),
             format_count(anova.df_within),
-            format_number(anova.mean_square_within, 3),
+            format_number(anova.mean_square_within, decimals),
         )
         rows = (
             ("Frequency", *between_cells, format_number(anova.f), format_p(anova.p)),
@@ -139,7 +153,7 @@ def make_one_way_table(analysis: StudyAnalysis) -> Table:
 def make_pair_table(analysis: StudyAnalysis) -> Table:
     """Make the table of pairs of frequencies: difference of the means (second minus first, N), simultaneous interval
     and p value."""
-    comparisons = analysis.comparisons
+    comparisons, decimals = analysis.comparisons, _choose_decimals(analysis)
     confidence_text = f"{100 * comparisons.confidence:g} %"
     return Table(
         caption="Pairs of frequencies (Tukey-Kramer)",
@@ -147,8 +161,8 @@ def make_pair_table(analysis: StudyAnalysis) -> Table:
         rows=tuple(
             (
                 f"{pair.second} − {pair.first}",
-                format_signed(pair.difference),
-                f"{format_signed(pair.lower)} to {format_signed(pair.upper)}",
+                format_signed(pair.difference, decimals),
+                f"{format_signed(pair.lower, decimals)} to {format_signed(pair.upper, decimals)}",
                 format_p(pair.p),
             )
             for pair in comparisons.pairs
@@ -226,8 +240,8 @@ def make_run_table(analysis: StudyAnalysis) -> Table:
         ("Hz", lambda row: f"{row.frequency_hz:g}"),
         ("N", _format_threshold),
         ("dB re 1 N", lambda row: format_number(row.threshold_db)),
-        ("m/s²", lambda row: format_number(row.threshold_mps2)),
-        ("mm", lambda row: format_number(row.threshold_mm, 3)),
+        ("m/s²", lambda row: format_number(row.threshold_mps2, choose_decimals(row.threshold_mps2, significant=1))),
+        ("mm", lambda row: format_number(row.threshold_mm, choose_decimals(row.threshold_mm, least=3, significant=1))),
         *(reversal_columns if has_reversals else ()),
         ("Trials", lambda row: str(row.trials)),
         ("at cap", lambda row: str(row.trials_at_cap)),
@@ -264,29 +278,3 @@ def _format_repeats(row: Threshold) -> str:
     if not row.repeats_at_will:
         return "0"
     return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"
-
-
-def make_ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
-    """Make the table of acceleration ellipses: ratio of the axes and tilt, from second moments and from phasors at the
-    driven frequency; off-axis over on-axis acceleration; energy of the harmonics in % of that of the fundamental."""
-    return Table(
-        caption="Acceleration ellipses",
-        header=(
-            "Frequency", "Along", "Force (N)", "Along (m/s²)", "Axes, mean squares", "Tilt", "Axes, phasors", "Tilt",
-            "Off / on axis", "Harmonics",
-        ),
-        rows=tuple(
-            (
-                f"{result.frequency_hz:g} Hz", result.along.replace("_", " "), format_number(result.amplitude_n),
-                format_number(result.phasor.on_axis_mps2), f"1 : {format_number(result.moments.normalised_axes[1])}",
-                f"{format_number(result.moments.tilt_deg, 0)}°", f"1 : {format_number(result.phasor.ellipticity)}",
-                f"{format_number(result.phasor.tilt_deg, 0)}°", format_number(result.phasor.off_axis_ratio),
-                f"{100 * result.phasor.harmonic_share:.1f} %",
-            )
-            for result in results
-        ),
-        notes=(
-            "Tilt: of the largest axis from the test direction. Harmonics: energy at 2 to 5 times the driven frequency "
-            "over that of the fundamental.",
-        ),
-    )  # fmt: skip

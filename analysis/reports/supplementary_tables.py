@@ -1,18 +1,20 @@
-"""Supplementary tables of a study report: detection, delivered acceleration, catch trials and practice.
+"""Supplementary tables of a study report: detection, delivered acceleration, catch trials, practice and
+acceleration ellipses.
 
 Detection threshold: the level from which a vibration is felt at all, in contrast to that from which its direction is
 felt. A threshold is "cut" where the force cap limited it (censored).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from analysis.psychophysics.bias import CRITERION_DEFINITION
+from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.equalized_delivery import compute_deliveries
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import describe_levels
 from analysis.reports.page import Table
 from analysis.threshold_words import select_threshold_words
-from analysis.wording import MISSING, format_number, format_signed, mark_cut
+from analysis.wording import MISSING, format_newtons, format_number, format_signed, mark_cut
 from protocols.procedure.staircase import to_db
 
 
@@ -141,6 +143,32 @@ def make_practice_table(analysis: StudyAnalysis) -> Table:
         notes=(f"At {describe_levels(settings)}; passed with {settings.right_needed} right.",),
         folded=True,
     )
+
+
+def make_ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
+    """Make the table of acceleration ellipses: ratio of the axes and tilt, from second moments and from phasors at the
+    driven frequency; off-axis over on-axis acceleration; energy of the harmonics in % of that of the fundamental."""
+    return Table(
+        caption="Acceleration ellipses",
+        header=(
+            "Frequency", "Along", "Force (N)", "Along (m/s²)", "Axes, mean squares", "Tilt", "Axes, phasors", "Tilt",
+            "Off / on axis", "Harmonics",
+        ),
+        rows=tuple(
+            (
+                f"{result.frequency_hz:g} Hz", result.along.replace("_", " "), format_newtons(result.amplitude_n),
+                format_number(result.phasor.on_axis_mps2), f"1 : {format_number(result.moments.normalised_axes[1])}",
+                f"{format_number(result.moments.tilt_deg, 0)}°", f"1 : {format_number(result.phasor.ellipticity)}",
+                f"{format_number(result.phasor.tilt_deg, 0)}°", format_number(result.phasor.off_axis_ratio),
+                f"{100 * result.phasor.harmonic_share:.1f} %",
+            )
+            for result in results
+        ),
+        notes=(
+            "Tilt: of the largest axis from the test direction. Harmonics: energy at 2 to 5 times the driven frequency "
+            "over that of the fundamental.",
+        ),
+    )  # fmt: skip
 
 
 def _format_detection_cells(

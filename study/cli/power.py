@@ -167,7 +167,9 @@ def _make_crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float)
 
 
 def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
-    """Format the lines of the result: power for each sample size, the compared frequencies, and roving."""
+    """Format the lines of the result: power for each sample size, the compared frequencies, roving, and what counts
+    where both medians are above the cap."""
+    from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_DB
     from analysis.threshold_words import select_threshold_words
     from study.workflows.planning.simulate_power import format_power_lines
 
@@ -177,7 +179,14 @@ def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str
     )
     comparison_text = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
     roving_lines = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
-    return [*format_power_lines(points, select_threshold_words(plan.rule).noun), "", comparison_text, *roving_lines]
+    medians_n = dict(zip(plan.crowd.frequencies_hz, plan.crowd.medians_n, strict=True))
+    above_cap_lines = [
+        f"Both medians lie above the cap of {plan.rule.cap_n:g} N. Where the model puts both more than "
+        f"{FAR_ABOVE_DB:g} dB above it, a report gives neither the difference nor its interval: this counts as not "
+        "found and not covered."
+    ] * (min(medians_n[first_hz], medians_n[second_hz]) > plan.rule.cap_n)
+    power_lines = format_power_lines(points, select_threshold_words(plan.rule).noun)
+    return [*power_lines, "", comparison_text, *roving_lines, *above_cap_lines]
 
 
 def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":

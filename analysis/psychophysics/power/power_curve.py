@@ -46,7 +46,8 @@ class StudyVerdict:
     means_found: bool
     """Whether a paired t test of reversal means in dB (Psi: posterior means) finds the difference."""
     means_error_db: float
-    """Estimated minus true difference, by these means."""
+    """Estimated minus true difference, by these means; NaN where a run of the study, at any frequency, did not end, so
+    that its means and the published analysis have no result."""
     published_found: bool
     """Whether Tukey's test after a one-way ANOVA of means in newtons finds the difference."""
 
@@ -109,7 +110,9 @@ def judge_study(
         and primary_contrast.lower_db <= true_difference_db <= primary_contrast.upper_db,
         primary_error_db=float(fit.means_db[first_column] - fit.means_db[second_column]) - true_difference_db,
         means_found=means_contrast is not None and means_contrast.p < 1.0 - CONFIDENCE,
-        means_error_db=float((study.threshold_db[:, first_column] - study.threshold_db[:, second_column]).mean())
+        means_error_db=math.nan
+        if np.isnan(study.threshold_db).any()
+        else float((study.threshold_db[:, first_column] - study.threshold_db[:, second_column]).mean())
         - true_difference_db,
         published_found=difference_n > critical_difference_n,
     )

@@ -92,11 +92,15 @@ def simulate_power(
     ]
     finished_count = sum(len(verdicts_by_chunk[chunk]) for chunk in verdicts_by_chunk if chunk[0] in plan.people)
     on_finished(finished_count)
+    for chunk, verdicts in verdicts_by_chunk.items():
+        if chunk[0] in plan.people:
+            _require_ended_runs(verdicts)
     for chunk, verdicts in run_tasks(executor, judge_chunk, ((chunk, (plan, chunk)) for chunk in remaining_chunks)):
         verdicts_by_chunk[chunk] = verdicts
         _append_json_line(progress_path, {"piece": chunk, "verdicts": [asdict(verdict) for verdict in verdicts]})
         finished_count += len(verdicts)
         on_finished(finished_count)
+        _require_ended_runs(verdicts)
     points = tuple(_summarise_size(verdicts_by_chunk, sample_size) for sample_size in plan.people)
     payload = {"plan": _summarise_plan(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
     write_json(folder / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
@@ -105,8 +109,7 @@ def simulate_power(
 
 
 def _summarise_size(verdicts_by_chunk: Mapping[StudyChunk, Sequence[StudyVerdict]], sample_size: int) -> PowerPoint:
-    """Summarise the studies of one sample size. Raises WrongUseError where a simulated run did not end and so has no
-    threshold."""
+    """Summarise the studies of one sample size."""
     # In the order of the plan, not in the order of finishing, so that rounding of sums is the same in every run.
     verdicts = [
         verdict
@@ -114,15 +117,20 @@ def _summarise_size(verdicts_by_chunk: Mapping[StudyChunk, Sequence[StudyVerdict
         if chunk[0] == sample_size
         for verdict in verdicts_by_chunk[chunk]
     ]
+    return summarise_power(verdicts)
+
+
+def _require_ended_runs(verdicts: Sequence[StudyVerdict]) -> None:
+    """Raise WrongUseError where a run of the studies of a chunk did not end and so has no threshold."""
     unended_count = sum(math.isnan(verdict.means_error_db) for verdict in verdicts)
     if unended_count:
         raise WrongUseError(
             "Simulated runs did not end",
-            f"In {unended_count} of {len(verdicts)} studies a run did not reach its reversals in {MOST_TRIALS} trials.",
+            f"In {unended_count} of {len(verdicts)} studies of {verdicts[0].people} people a run did not reach its "
+            f"reversals in {MOST_TRIALS} trials.",
             "Set fewer staircase.reversals or a smaller staircase.down_after_right, or give a lower --threshold-n.",
             saved=f"The finished studies are kept in {PROGRESS_NAME}.",
         )
-    return summarise_power(verdicts)
 
 
 def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -> None:

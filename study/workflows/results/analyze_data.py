@@ -6,6 +6,7 @@ hierarchical model, analysis of variance); the results are written with their pr
 
 import errno
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from analysis.figures.picture import Picture
@@ -16,6 +17,7 @@ from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import describe_declared
 from analysis.reports.primary_tables import describe_direction_limit, format_median_interval
 from analysis.reports.study_report import render_study_report
+from analysis.wording import format_newtons
 from study.errors import StudyError, WrongUseError
 from study.local_clock import format_local_now
 from study.store.disk.file_errors import CannotWriteError
@@ -108,7 +110,7 @@ def _format_frequency_lines(table: ThresholdTable, heading: str) -> list[str]:
     for column, frequency_hz in enumerate(table.frequencies_hz):
         thresholds_n = [threshold_n for row in table.values if (threshold_n := row[column]) is not None]
         censored_count = sum(row[column] for row in table.censored)
-        mean_text = f"{sum(thresholds_n) / len(thresholds_n):.3f} N" if thresholds_n else "-"
+        mean_text = f"{format_newtons(sum(thresholds_n) / len(thresholds_n), 3)} N" if thresholds_n else "-"
         lines.append(f"{frequency_hz:7g} Hz  {mean_text:>10}  {censored_count:>10}  {len(thresholds_n):>12}")
     return lines
 
@@ -120,9 +122,12 @@ def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]
     for median in analysis.primary.medians:
-        median_text = "above cap" if median.above_cap else f"{median.newton:.3f} N"
+        median_text = "above cap" if median.above_cap else f"{format_newtons(median.newton, 3)} N"
         unit_text = " N" if median.lower_n is not None else ""
-        interval_text = format_median_interval(median.lower_n, median.upper_n, median.above_cap, 3) + unit_text
+        format_limit = partial(format_newtons, least=3)
+        interval_text = (
+            format_median_interval(median.lower_n, median.upper_n, median.above_cap, format_limit) + unit_text
+        )
         lines.append(f"{median.frequency_hz:7g} Hz  {median_text:>10}  {interval_text}")
     return [*lines, describe_direction_limit(analysis.primary), analysis.comparison_text]
 

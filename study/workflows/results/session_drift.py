@@ -73,10 +73,15 @@ class DriftReader:
 
     def _compare_probe(self, newest_probe: PlayedProbe) -> tuple[Drift, ...]:
         """Compare the newest probe with earlier ones: the test segment of a reference with both segments of the
-        session's first reference; a probe with a hand with the first probes of the same sitting. Empty where there are
-        too few probes (`find_drifts`)."""
+        session's first reference at the same sample rate; a probe with a hand with the first probes of the same
+        sitting. Empty where there are too few probes (`find_drifts`)."""
         if newest_probe.kind == "reference":
-            reference_lines = [probe_lines for probe, probe_lines in self._usable_probes if probe.kind == "reference"]
+            newest_rate_hz = self._usable_probes[-1][1].rate_hz
+            reference_lines = [
+                probe_lines
+                for probe, probe_lines in self._usable_probes
+                if probe.kind == "reference" and probe_lines.rate_hz == newest_rate_hz
+            ]
             first_reference, last_reference = reference_lines[0], reference_lines[-1]
             return (
                 find_drifts(

@@ -5,6 +5,7 @@ with what the log gives.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -21,8 +22,8 @@ from study.store.disk.provenance import gather_provenance
 from study.store.disk.text_file import read_text
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds, write_thresholds
 from study.store.formats.trials_file import TRIALS_NAME, read_trials, write_trials
-from study.store.sessions.archive import SessionFolder
-from study.store.sessions.log_seal import SEAL_NAME, write_seal
+from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
+from study.store.sessions.log_seal import SEAL_NAME, find_seals, write_seal
 from study.store.sessions.session_lock import hold_session_lock
 from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_NAME, SUMMARY_VERSION, read_summary
 from study.workflows.results.analysis_files import ANALYSIS_NAME
@@ -44,16 +45,30 @@ class ResultProblem:
 
 def write_tables(folder: SessionFolder) -> SessionState:
     """Write the seal of a closed session if it is due, trials.csv, thresholds.csv, detection.csv (for detection runs)
-    and session.json. Returns the state that the log gives. Raises StudyError."""
+    and session.json. Returns the state that the log gives. Raises StudyError; SessionWithdrawnError also where the
+    participant withdrew while the files were written, which are then removed."""
     folded_session = fold_session(folder)
     state = folded_session.state
-    if folded_session.seal_due:
-        write_seal(folder.path, folded_session.log_contents)
-    write_trials(folder.path / TRIALS_NAME, state.trials)
-    for name, rows in _compute_tables(state).items():
-        write_thresholds(folder.path / name, rows)
-    _write_summary(folder, state)
+    try:
+        if folded_session.seal_due:
+            write_seal(folder.path, folded_session.log_contents)
+        write_trials(folder.path / TRIALS_NAME, state.trials)
+        for name, rows in _compute_tables(state).items():
+            write_thresholds(folder.path / name, rows)
+        _write_summary(folder, state)
+    finally:  # also after an error: the withdrawal may have erased a file that was being written or read
+        if folder.withdrawn:
+            _remove_results(folder)
+            raise SessionWithdrawnError(folder)
     return state
+
+
+def _remove_results(folder: SessionFolder) -> None:
+    """Remove the files that `write_tables` writes, as far as possible."""
+    names = (TRIALS_NAME, THRESHOLDS_NAME, DETECTION_NAME, SUMMARY_NAME)
+    for path in (*find_seals(folder.path).values(), *(folder.path / name for name in names)):
+        with suppress(OSError):
+            path.unlink()
 
 
 def list_due_results(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:

@@ -113,6 +113,22 @@ def test_a_recording_without_a_whole_period_is_refused(drifting_device):
         compute_probe_lines(with_response(played, torn), 1.0)
 
 
+@pytest.mark.parametrize("reading", [0.0, 9.81])
+def test_a_sensor_of_which_an_axis_reads_the_same_all_the_time_is_refused(drifting_device, reading):
+    """The mean over the axes hid it, and the comparison of probes ended with an error of linear algebra."""
+    (played,) = drifting_device.play(WAVE, [drifting_device.Truth()], (0.8,), seed=1)
+    samples = np.where([False, False, True], reading, played.response.samples)
+    with pytest.raises(ValueError, match="does not follow the force: check the accelerometer and its cable"):
+        compute_probe_lines(with_response(played, samples), 1.0)
+
+
+def test_first_probes_without_any_difference_are_compared_too(session):
+    """As of a replayed recording: there was no noise to divide by."""
+    first, changed = session(1)[:3], session(1, friction_n=0.2)[6:]
+    assert find_drifts([*first, *first, *first], 1000) == ()
+    assert {drift.cause for drift in find_drifts([*first, *first, *changed], 1000)} == {"friction"}
+
+
 def test_a_gap_in_the_excitation_is_refused(drifting_device):
     (played,) = drifting_device.play(WAVE, [drifting_device.Truth()], (0.8,), seed=1)
     samples = np.where(np.arange(len(played))[:, None] == 5, np.nan, played.command.samples)

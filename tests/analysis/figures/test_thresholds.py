@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from analysis.figures.style import MARKERS, choose_colour, choose_marker, create_figure, set_newton_ticks
+from analysis.figures.style import BLACK, MARKERS, choose_colour, choose_marker, create_figure, set_newton_ticks
 from analysis.figures.thresholds import draw_thresholds
-from analysis.psychophysics.comparisons import Comparisons
+from analysis.psychophysics.comparisons import ComparisonInterval, Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
 
 
@@ -37,7 +37,10 @@ def test_the_legend_ends_within_the_figure_however_many_participants_it_lists(pe
     assert figure.bbox.y0 < legend.get_window_extent().y0 and legend.get_window_extent().y1 < figure.bbox.y1
 
 
-@pytest.mark.parametrize(("lowest_n", "highest_n"), [(1.05, 1.8), (0.002, 0.009), (0.1, 3.0), (1e-4, 3.0), (1e-9, 3.0)])
+@pytest.mark.parametrize(
+    ("lowest_n", "highest_n"),
+    [(1.05, 1.8), (1.05, 1.4), (1.11, 1.19), (0.002, 0.009), (0.1, 3.0), (1e-4, 3.0), (1e-9, 3.0)],
+)
 def test_an_axis_of_levels_has_a_few_numbers_wherever_it_lies(lowest_n, highest_n):
     """A cap below 2 N, or that of a small device, left it without any; after right answers only, they overlapped."""
     axes = create_figure(3.0, 3.0).add_subplot()
@@ -45,4 +48,23 @@ def test_an_axis_of_levels_has_a_few_numbers_wherever_it_lies(lowest_n, highest_
     axes.set_ylim(lowest_n, highest_n)
     set_newton_ticks(axes.yaxis, lowest_n, highest_n)
     ticks = np.array([float(label.get_text()) for label in axes.get_yticklabels()])
-    assert 0 < len(ticks) < 8 and np.all((lowest_n <= ticks) & (ticks <= highest_n))
+    assert 1 < len(set(ticks)) == len(ticks) < 8 and np.all((lowest_n <= ticks) & (ticks <= highest_n))
+
+
+def test_an_interval_that_passes_an_end_of_the_axis_has_an_arrowhead_there():
+    """It was cut off at 0 N, as if it ended there."""
+    table = ThresholdTable(
+        "threshold_n", ("s1", "s2"), (5.0, 25.0, 45.0), ((0.3, 1.0, 2.5), (0.5, 1.2, 2.7)), ((False,) * 3,) * 2,
+        ((False,) * 3,) * 2, (),
+    )  # fmt: skip
+    widths = (("5 Hz", 0.4, 0.6), ("25 Hz", 1.1, 0.6), ("45 Hz", 2.6, 0.9))
+    intervals = tuple(ComparisonInterval(name, mean, mean - width, mean + width) for name, mean, width in widths)
+    figure = draw_thresholds(table, Comparisons(0.95, 3.0, (), intervals, ()), 3.0)
+    (axes,) = figure.axes
+    heads = [
+        (line.get_xdata()[0], line.get_ydata()[0])
+        for line in axes.lines
+        if line.get_marker() in "v^" and line.get_color() == BLACK
+    ]
+    assert heads == [(0, 0.0), (2, axes.get_ylim()[1])]
+    assert "interval passes the\naxis" in [text.get_text() for text in figure.legends[0].get_texts()]

@@ -153,6 +153,23 @@ def test_runs_that_do_not_end_are_refused(run):
         run(replace(PLAN, crowd=Crowd((5.0, 45.0), (5.0, 5.0)), rule=rule, people=(3,), studies=2))
 
 
+def test_runs_that_do_not_end_are_refused_before_further_studies_are_simulated(run, tmp_path):
+    """All studies of all sizes were simulated first."""
+    rule = replace(RULE, down_after_right=9)
+    plan = replace(PLAN, crowd=Crowd((5.0, 45.0), (5.0, 5.0)), rule=rule, people=(3, 4, 5), studies=1)
+    for _ in range(2):
+        with pytest.raises(WrongUseError, match="1 of 1 studies of 3 people"):
+            run(plan)
+        assert len((tmp_path / "power" / PROGRESS_NAME).read_text("utf-8").splitlines()) == 2
+
+
+def test_a_run_without_an_end_at_a_frequency_that_is_not_compared_is_refused_too():
+    """The published analysis has no result then, which counted as not found."""
+    rule = replace(RULE, down_after_right=9)
+    verdict = judge_study(Crowd((5.0, 25.0, 45.0), (0.2, 5.0, 0.2)), rule, 3, (1,))
+    assert np.isnan(verdict.means_error_db) and not verdict.published_found
+
+
 def test_sample_sizes_are_read():
     assert parse_sample_sizes("5:40:5") == (5, 10, 15, 20, 25, 30, 35, 40)
     assert parse_sample_sizes("12") == (12,)

@@ -1,6 +1,7 @@
 """A session whose device changes in its middle, as who follows it sees it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -9,7 +10,9 @@ from protocols.document.dumping import dump_protocol
 from study.devices.safe import SafeDevice
 from study.devices.simulated import layout, omega3
 from study.session.watching.followed_session import PlayedProbe
+from study.store.sessions.archive import SessionFolder
 from study.tui.watch.watch_lines import format_view
+from study.workflows.results import session_drift
 from study.workflows.results.session_drift import DriftReader
 from study.workflows.views.watch_session import follow
 
@@ -103,3 +106,16 @@ def test_two_references_tell_what_changed_at_the_device_alone(sitter, monkeypatc
     alone = [drift.sentence for drift in view.drifts if drift.sentence.startswith("without a hand, ")]
     assert alone
     assert all("friction" in each for each in alone)
+
+
+def test_references_of_another_sample_rate_are_not_compared(monkeypatch):
+    """The device was set to another rate between the sittings: what followed the session ended with an error."""
+    rates = iter((1000.0, 2000.0, 1000.0))
+    compared = []
+    monkeypatch.setattr(
+        DriftReader, "_read_probe", lambda reader, probe: session_drift._ProbeLines(next(rates), (probe, probe))
+    )
+    monkeypatch.setattr(session_drift, "find_drifts", lambda probes, *more: compared.append(probes) or ())
+    first, other, last = (PlayedProbe(number, "reference", 0.4, 60.0 * number, number) for number in range(3))
+    DriftReader(SessionFolder(Path("P01_001"))).update((first, other, last))
+    assert compared == [(first, first, last)]
