@@ -44,6 +44,7 @@ from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.search_by_simulation import SearchOutcome, make_search_context, search_by_simulation
 from analysis.diagnosis.types import Mapper, Progress
+from equalizer.effects.placing import shorten_axis_name
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
@@ -148,14 +149,15 @@ def _diagnose_with_clean(
     # Imported on demand: only some diagnoses have clean recordings.
     from analysis.diagnosis.reference.compare_with_reference import find_contrast, is_noise_from_repeats, predicts_clean
     from analysis.diagnosis.reference.learn_model_error import learn_model_floor
-    from analysis.diagnosis.result.contrast_findings import add_contrast
+    from analysis.diagnosis.result.contrast_findings import add_contrast, simulate_named_fault
 
     fitting = FittingMeasure(model, make_measure(recordings, model))
     progress("comparing with the clean recordings", 0.1)
     contrast = find_contrast(recordings, settings.clean, frozenset(settings.without), settings.time_left)
     if is_too_short_to_name(recordings):
         contrast = contrast.withdraw_name(TOO_SHORT_TO_NAME)
-    if not settings.fitted and (is_noise_from_repeats(fitting.chosen) or predicts_clean(model, settings.clean)):
+    is_clean_predicted = not settings.fitted and predicts_clean(model, settings.clean)
+    if is_clean_predicted or (not settings.fitted and is_noise_from_repeats(fitting.chosen)):
         findings_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
         diagnosis_by_model = findings_by_model.diagnosis
         names = frozenset(name for effect in diagnosis_by_model.effects for name in (effect.effect, *effect.class_))
@@ -171,7 +173,8 @@ def _diagnose_with_clean(
         ModelErrorFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     )
     findings = _assemble(recordings, settings, fitting, SearchOutcome(given_result, floor), ())
-    return add_contrast(findings, contrast, recordings[0], FAULT_GAIN_FACTOR)
+    findings = add_contrast(findings, contrast, recordings[0], FAULT_GAIN_FACTOR)
+    return simulate_named_fault(findings, given_result.context, recordings[0]) if is_clean_predicted else findings
 
 
 def _evaluate_given_model(
@@ -267,4 +270,17 @@ def _assemble(
     named_effects = {effect.effect for effect in diagnosis.effects}
     curves = tuple(curve for curve in findings.signatures if curve.effect in named_effects)
     completed = replace(findings, diagnosis=diagnosis, remarks=remarks, fitted=settings.fitted, signatures=curves)
-    return replace(completed, balance_errors=errors_by_balance, state_maps=maps)
+    return replace(
+        completed,
+        balance_errors=errors_by_balance,
+        state_maps=maps,
+        reading_units=_list_reading_units(recordings[0]),
+    )
+
+
+def _list_reading_units(recording: Recording) -> dict[str | None, str]:
+    """List the units of the response channels: `Findings.reading_units`."""
+    channels, units = recording.response.channels, recording.response.units
+    names = (shorten_axis_name(channel, channels) for channel in channels)
+    reading_units: dict[str | None, str] = dict(zip(names, units, strict=True))
+    return reading_units | ({None: units[0]} if len(set(units)) == 1 else {})

@@ -148,8 +148,7 @@ class Candidate:
     effect: EffectWord
     place: Place
     axis: str | None
-    parameters: dict[str, float]
-    """Fitted values by the name of the parameter, in SI units."""
+    parameters: dict[str, float]  # fitted values by the name of the parameter, in SI units
     held_out_gain: Annotated[
         Share, Field(description="Share of the error power on held-out data that it would explain.")
     ]
@@ -197,7 +196,10 @@ class Diagnosis:
     verdict: Verdict
     mismatch: tuple[Mismatch, ...]
     effects: tuple[NamedEffect, ...]
-    retuned: Annotated[dict[str, JsonValue], Field(description="The model's own parameters after re-tuning.")]
+    retuned: Annotated[
+        dict[str, JsonValue],
+        Field(description="Changes of the model's own parameters by re-tuning (modes: relative); values of constants."),
+    ]
     remainder: tuple[Mismatch, ...]
     fit: Fit
     error: Annotated[

@@ -227,21 +227,18 @@ def _find_words(effect: str) -> EffectWords | None:
     return EFFECT_WORDS.get(effect) if law_words is None else law_words.words
 
 
-def get_parameter_unit(effect: str, parameter: str, system: UnitSystem) -> str:
-    """Return the unit of an effect's parameter in the unit system; "1" where it is not known."""
-    if effect in LAW_WORDS:
-        linear_unit, rotational_unit = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
+def get_parameter_unit(effect: str, parameter: str, system: UnitSystem, reading_unit: str = "1") -> str:
+    """Return the unit of an effect's parameter in the unit system; "1" where it is not known. reading_unit: of the
+    sensor's reading; "1" where it is not known."""
+    law = LAW_WORDS.get(effect)
+    if law is not None and law.place == "sensor":
+        return reading_unit if parameter in law.words.parameters else "1"
+    if law is not None:
+        linear_unit, rotational_unit = law.units.get(parameter, ("1", "1"))
         return rotational_unit if system.rotational else system.express(linear_unit)
-    catalogue_entry = EFFECTS_BY_NAME.get(effect)
-    units = (
-        {}
-        if catalogue_entry is None
-        else {
-            entry_parameter.name: entry_parameter.find_unit(system, "1")
-            for entry_parameter in catalogue_entry.parameters
-        }
-    )
-    return units.get(parameter, "1")
+    entry = EFFECTS_BY_NAME.get(effect)
+    matching = (known for known in (() if entry is None else entry.parameters) if known.name == parameter)
+    return next((known.find_unit(system, reading_unit) for known in matching), "1")
 
 
 def format_place(place: Place, axis: str | None, is_single_axis: bool = False) -> str:

@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from analysis.look.channels import Channel, compute_rms
-from analysis.look.check import Check, add_fine_if_none
+from analysis.look.check import FREE_ADVICE, UNDRIVEN_ADVICE, Check, add_fine_if_none
 from equalizer.signals.signal import FloatArray, find_runs
 
 MISSING_CHECK, CONSTANT_CHECK, COPIES_CHECK = "missing samples", "constant channels", "copied channels"
@@ -49,22 +49,23 @@ def _report_missing_samples(channel: Channel, rate_hz: float) -> Check:
 def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """Check commands and sensors for constant values: one check per constant channel, or a single "fine" check.
     Conditions and excitations are left out: they may be constant."""
-    measured = [channel for channel in channels if channel.role not in ("condition", "excitation")]
-    checks = tuple(
-        _report_constant_channel(channel)
-        for channel in measured
-        if channel.finite_samples.size and np.ptp(channel.finite_samples) == 0
-    )
+    constant = [
+        channel
+        for channel in channels
+        if channel.role not in ("condition", "excitation")
+        and channel.finite_samples.size
+        and np.ptp(channel.finite_samples) == 0
+    ]
+    is_driven = any(channel.role == "command" and channel not in constant for channel in channels)
+    checks = tuple(_report_constant_channel(channel, is_driven) for channel in constant)
     return add_fine_if_none(CONSTANT_CHECK, checks, "Every command and every sensor changes.")
 
 
-def _report_constant_channel(channel: Channel) -> Check:
-    """Report a constant channel: a notice for a command, "wrong" for a sensor."""
+def _report_constant_channel(channel: Channel, is_driven: bool) -> Check:
+    """Report a constant channel: a notice for a command, "wrong" for a sensor. is_driven: whether a command changes."""
     text = f"{channel.label} is {channel.format(float(channel.finite_samples[0]))} throughout."
     if channel.role == "command":
-        return Check(
-            CONSTANT_CHECK, "notice", text, "Its effect cannot be determined; leave it out, or record it driven."
-        )
+        return Check(CONSTANT_CHECK, "notice", text, UNDRIVEN_ADVICE if is_driven else FREE_ADVICE)
     return Check(
         CONSTANT_CHECK, "wrong", text, "Check the cable and the map: a working sensor is never exactly constant."
     )

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.look.channels import Channel
-from analysis.look.check import Check
+from analysis.look.check import FREE_ADVICE, UNDRIVEN_ADVICE, Check
 from analysis.look.cross_spectra import CrossSpectra
 from equalizer.signals.recording import Recording
+from equalizer.signals.recording_checks import find_unusable_channels
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_CHECK, COHERENCE_CHECK = "driven axes", "coherence"
@@ -148,24 +149,19 @@ def _average_coherence(coherence: FloatArray, power: FloatArray) -> float:
     return float(np.sum(coherence * power) / total_power) if total_power > 0 else 0.0
 
 
-def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tuple[Check, ...]:
+def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand] | None) -> tuple[Check, ...]:
     """Check the excitation: a notice for each command that is not driven, "wrong" for each segment that states an
-    amplitude without excitation, and a "fine" check with all driven bands, if any."""
-    driven_names = {band.command for band in bands}
+    amplitude without excitation, and a "fine" check with all driven bands, if any. bands: None = not known, because no
+    spectra were computed; no command is then called undriven."""
+    driven_names = set(recording.command.channels) if bands is None else {band.command for band in bands}
+    unusable_count = len(list(find_unusable_channels([recording.command])))
+    advice = UNDRIVEN_ADVICE if unusable_count < len(recording.command.channels) else FREE_ADVICE
     undriven_commands = [name for name in recording.command.channels if name not in driven_names]
-    checks = [
-        Check(
-            DRIVEN_CHECK,
-            "notice",
-            f"command '{name}' is not driven.",
-            "Its effect cannot be determined; leave it out, or record it driven.",
-        )
-        for name in undriven_commands
-    ]
+    checks = [Check(DRIVEN_CHECK, "notice", f"command '{name}' is not driven.", advice) for name in undriven_commands]
     checks += [
         Check(DRIVEN_CHECK, "wrong", sentence, "Correct the segments.") for sentence in find_silent_segments(recording)
     ]
-    bands_text = "; ".join(f"'{band.command}' from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
+    bands_text = "; ".join(f"'{band.command}' from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands or ())
     return (*checks, *((Check(DRIVEN_CHECK, "fine", f"Driven bands: {bands_text}."),) if bands_text else ()))
 
 

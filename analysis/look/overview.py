@@ -160,7 +160,7 @@ def make_overview(name: str, recording: Recording) -> Overview:
         *check_clipping(channels),
         *check_resolution(channels),
         *check_offsets(channels),
-        *check_driven_axes(recording, bands),
+        *check_driven_axes(recording, bands if spectra else None),
         *check_coherences(coherences, recording),
         *check_proportionality(levels, channels),
         *check_repeats(recording, repeats),

@@ -21,6 +21,9 @@ from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 
+ACTUATOR_LAWS = frozenset({"amplifier_lag"})
+"""Laws of the motion that an actuator causes: left out where the motion was imposed or free, so that none acts."""
+
 
 def find_balances(
     recordings: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
@@ -30,6 +33,8 @@ def find_balances(
     of `FREE_LAWS`. Where all axes can be tested and no law is named in the band that noise allows (`band.py`), the
     narrower band in which the device moves is tried, because power of the command above that band hides laws; then the
     samples in motion alone. Laws outside the catalogue are compared with the result."""
+    is_imposed = any(recording.meta.get("imposed") for recording in recordings)
+    excluded |= ACTUATOR_LAWS if is_imposed else frozenset()
     try:
         records = observe_parts(recordings, len(recordings[0].response.channels))
         motions = compute_motions(records)
@@ -40,7 +45,6 @@ def find_balances(
         if any(balance.named or not balance.tested for balance in balances) or not time_left():
             break
         balances = balance_selected_motions(select, records, motions, excluded, time_left, map_) or balances
-    is_imposed = any(recording.meta.get("imposed") for recording in recordings)
     compared_balances = [compare_with_free_laws(balance, excluded) if time_left() else balance for balance in balances]
     return tuple(
         balance if balance is catalogue_balance or is_imposed else withdraw_ambiguous_names(balance)

@@ -28,8 +28,9 @@ from analysis.diagnosis.discovery.periodic_terms import find_periodic_terms
 
 def list_view_terms(view: View) -> tuple[Term, ...]:
     """List all candidate terms of a view. Starting values and bounds, and the periods and frequencies of periodic
-    terms, are taken from its first record."""
-    record = view.records[0]
+    terms, are taken from the record with the largest missing force (sum of squares), so that the order of the
+    records does not matter."""
+    record = max(view.records, key=lambda candidate: float(np.sum(candidate.missing_force**2)))
     if view.acts_on == "response":
         return list_reading_terms(record.columns, view.axis, len(record.reading_units))
     axes = measure_axes(record.columns, record.missing_force.shape[1])

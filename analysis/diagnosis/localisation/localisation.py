@@ -47,19 +47,28 @@ class Localisation:
 
 
 def find_entry_point(
-    measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor, cells: Sequence[MismatchCell]
+    measure: ErrorMeasure,
+    tuning: Tuning,
+    fitted: Fitted,
+    floors: Sequence[NoiseFloor],
+    cells: Sequence[MismatchCell],
 ) -> EntryPoint | None:
-    """Find the entry point of the residual of the first recording, which represents the device. fitted: the re-tuned
-    model; floor: noise of that recording; cells: mismatch map of the re-tuned model. None where no cell exceeds the
-    noise, no free simulation was compared, or the spectra cannot be computed (`compute_residual_spectra`)."""
+    """Find the entry point of the residual of the recording with the largest error (`_find_worst_record`). fitted: the
+    re-tuned model; floors: noise of each recording; cells: mismatch map of the re-tuned model. None where no cell
+    exceeds the noise, no free simulation was compared, or the spectra cannot be computed
+    (`compute_residual_spectra`)."""
     if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
-    record = measure.records[0]
+    record_index = _find_worst_record(cells)
+    record = measure.records[record_index]
     recording, response_count = record.recording, record.recording.response.samples.shape[1]
-    predicted = record.measured - fitted.residuals[0] * measure.unit
+    predicted = record.measured - fitted.residuals[record_index] * measure.unit
     position = predicted[:, response_count:] if predicted.shape[1] > response_count else None
     spectra = compute_residual_spectra(
-        recording, Prediction(predicted[:, :response_count], position), floor, record.fit | record.choose
+        recording,
+        Prediction(predicted[:, :response_count], position),
+        floors[record_index],
+        record.fit | record.choose,
     )
     if spectra is None:
         return None
@@ -77,16 +86,15 @@ def find_state_dependences(
     entry: EntryPoint | None,
     computed_evidence: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
-    """Find the states on which the first recording's residual depends: those of the sensor's error where a sensor is
-    the best entry (none for a position's sensor, whose error is not tested), else those of the missing force. cells:
-    mismatch map of `fitted`; no state where none exceeds the noise. computed_evidence: evidence of `fitted`; computed
-    here if empty."""
+    """Find the states on which the residual of the recording with the largest error (`_find_worst_record`) depends:
+    those of the sensor's error where a sensor is the best entry (none for a position's sensor, whose error is not
+    tested), else those of the missing force. cells: mismatch map of `fitted`; no state where none exceeds the noise.
+    computed_evidence: evidence of `fitted`; computed here if empty."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
-    recording, evidence = (
-        measure.records[0].recording,
-        (computed_evidence or gather_evidence(measure, tuning, fitted))[0],
-    )
+    record_index = _find_worst_record(cells)
+    recording = measure.records[record_index].recording
+    evidence = (computed_evidence or gather_evidence(measure, tuning, fitted))[record_index]
     best_entry = entry.ranking[0] if entry is not None and entry.ranking else None
     if best_entry is not None and best_entry.is_position_error:
         return ()
@@ -94,6 +102,12 @@ def find_state_dependences(
         channels = recording.response.channels if best_entry.axis is None else (best_entry.axis,)
         return find_error_states(evidence, recording, cells, channels)
     return find_force_states(evidence, recording, cells, tuning.model.system)
+
+
+def _find_worst_record(cells: Sequence[MismatchCell]) -> int:
+    """Find the index of the record with the largest error beyond noise, in units of the noise, so that the order of the
+    recordings does not matter. cells: with one beyond noise at least."""
+    return max((cell for cell in cells if cell.beyond_noise), key=lambda cell: cell.in_noise).part
 
 
 def _list_possible_entries(

@@ -28,7 +28,7 @@ from analysis.diagnosis.result.examine_fits import examine_fits
 from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.named_effects import Labels, make_labels, make_named_effects
 from analysis.diagnosis.result.unconfirmed_candidates import add_held_out_gains
-from analysis.diagnosis.result.unit_doubt import describe_unit_doubts, describe_unknown_units
+from analysis.diagnosis.result.unit_doubt import describe_measured_doubts, describe_unknown_units
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import compute_final_errors, compute_interval_errors
 from analysis.diagnosis.search.search_context import SearchContext
@@ -58,6 +58,7 @@ def assemble_findings(
     examination = examine_fits(result, floors, maps)
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
+    unit_doubts = describe_measured_doubts(measure, tuning.model, floors, time_series)
     measure_remarks = (_describe_held_out_rest(measure), describe_model_error_floor(learned, channels), in_samples)
     return Findings(
         diagnosis=_build_document(result, errors, (maps, examination.localisation), proposal),
@@ -74,7 +75,7 @@ def assemble_findings(
         is_timed=recording.is_timed,
         signatures=examination.signatures,
         black_box=examination.black_box,
-        remarks=_collect_remarks(measure_remarks, time_series, tuning, floors),
+        remarks=_collect_remarks((measure_remarks, unit_doubts), tuning, floors),
         maps=maps.cells,
         localisation=examination.localisation,
         floor=floors[0],
@@ -111,13 +112,12 @@ def _describe_held_out_rest(measure: ErrorMeasure) -> str:
 
 
 def _collect_remarks(
-    measure_remarks: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
+    first_remarks: Sequence[Sequence[str]], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
-    """Collect remarks without repetition: measure_remarks, then on doubtful and unknown units, and on the noise."""
+    """Collect remarks without repetition: first_remarks, then on unknown units, and on the noise."""
     noise_remarks = (remark for floor in floors for remark in floor.remarks)
     remarks = (
-        *measure_remarks,
-        *describe_unit_doubts(time_series),
+        *(remark for group in first_remarks for remark in group),
         describe_unknown_units(tuning.model),
         *noise_remarks,
     )

@@ -4,8 +4,8 @@ A class contains a named effect and the effects that explain the held-out data e
 a family of `_LAW_FAMILIES`, its name is stated, too.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect, format_law
 from analysis.diagnosis.effect_words import (
@@ -74,6 +74,8 @@ class DeviceWording:
     """Units of the recordings."""
     noise: str = ""
     """Origin of the noise estimate, `NoiseFloor.method`; empty where it is not known."""
+    reading_units: Mapping[str | None, str] = field(default_factory=dict)
+    """As `Findings.reading_units`; empty where they are not known."""
 
 
 def format_class_noun(effect: NamedEffect) -> str:
@@ -147,12 +149,12 @@ def format_candidate_parameters(candidate: Candidate, device: DeviceWording | No
             f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()
         )
         return f"{text} (SI)" if text else ""
-    units = {name: get_parameter_unit(candidate.effect, name, device.system) for name in candidate.parameters}
+    reading_unit = device.reading_units.get(candidate.axis, "1")
     return format_parameters(
         candidate.effect,
         {
-            parameter_name: Estimate(parameter_value, units[parameter_name])
-            for parameter_name, parameter_value in candidate.parameters.items()
+            name: Estimate(value, get_parameter_unit(candidate.effect, name, device.system, reading_unit))
+            for name, value in candidate.parameters.items()
         },
     )
 

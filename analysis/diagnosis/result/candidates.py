@@ -179,7 +179,7 @@ def describe_linear_terms(
         base_terms, motion = balance.search.regression.base_terms, balance.search.regression.motions[0]
         law_names = [law.effect for law in balance.linear_laws]
         delay_text = f"{base_terms.delay_s:.3g} samples" if in_samples else f"{1e3 * base_terms.delay_s:.3g} ms"
-        term_texts = [f"a delay of the command of {delay_text} (or a lag)"] if base_terms.delay_s else []
+        term_texts = [f"a delay of {delay_text} from force to motion (or a lag)"] if base_terms.delay_s else []
         term_texts += [get_noun(name) for name in dict.fromkeys(law_names)]
         if len(motion.channels) > len(balances):
             further_motions = [name for index, name in enumerate(motion.channels) if index != base_terms.driven_channel]

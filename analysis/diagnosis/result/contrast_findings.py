@@ -15,12 +15,15 @@ from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import get_parameter_unit
+from analysis.diagnosis.errors.fit_score import compute_fit_score
 from analysis.diagnosis.limits import CONTRAST_BLOCKS, SAME_DEVICE_EXCESS
 from analysis.diagnosis.reference.compare_with_reference import Contrast
+from analysis.diagnosis.result.error_table import compute_fit_errors
 from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.placing import shorten_axis_name
+from equalizer.effects.placing import place_recorded_effects, shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
@@ -41,6 +44,11 @@ NOT_COMPARED = (
 """Remark where no comparison was possible."""
 SHOWN_DIRECTLY = "The recorded signal itself shows this fault, and the clean recordings do not; no model was used."
 """Remark on a fault found without a model."""
+SIMULATED = (
+    "The given model predicts the clean recordings. The errors here are those of its simulation, without and with the "
+    "named fault."
+)
+"""Remark where the errors of `simulate_named_fault` are stated."""
 
 
 def add_contrast(findings: Findings, contrast: Contrast, recording: Recording, gain_factor: float) -> Findings:
@@ -243,3 +251,22 @@ def _improve_model(model: MechanicalModel, effects: tuple[NamedEffect, ...]) -> 
         if effect.effect in EFFECTS
     )
     return replace(model, effects=(*model.effects, *model_effects))
+
+
+def simulate_named_fault(findings: Findings, context: SearchContext, recording: Recording) -> Findings:
+    """State the errors of a simulation of the given model with the fault that a comparison names, instead of the errors
+    of the comparison's base model; the verdict stays. Unchanged where no fault that can be simulated is named, or the
+    simulation does not confirm it by a smaller error. context: of the given model, which predicts the clean
+    recordings."""
+    faults, measure = findings.improved.effects[len(findings.given.effects) :], context.full_measure
+    if not faults:
+        return findings
+    model, given = replace(findings.given, effects=faults), findings.explanation.before
+    residuals = measure.residuals(findings.given, place_recorded_effects(model, recording))
+    score = compute_fit_score(measure, residuals)
+    if not score.mean_log_error < given.score.mean_log_error:
+        return findings
+    completed = FittedCandidate(replace(given.fitted, residuals=residuals), score)
+    errors = compute_fit_errors(measure, replace(findings.explanation, after=completed))
+    diagnosis = replace(findings.diagnosis, fit=errors, error=measure.name)
+    return replace(findings, diagnosis=diagnosis, remarks=(SIMULATED, *findings.remarks))

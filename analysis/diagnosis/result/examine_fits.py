@@ -56,7 +56,7 @@ def examine_fits(search_result: SearchResult, floors: Sequence[NoiseFloor], maps
     context, explanation = search_result.context, search_result.found
     measure, tuning, stages = context.full_measure, context.tuning, explanation.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
-    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floors[0], maps.cells["retuned"])
+    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floors, maps.cells["retuned"])
     entry_point = context.guard.run(LOCALISATION_NAME, "its work", entry_search, None)
     # Stages with the same fit are examined once.
     stage_by_fit = {id(fitted): stage for stage, fitted in stages.items()}

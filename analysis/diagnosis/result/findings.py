@@ -166,6 +166,8 @@ class Findings(SummaryDisplay):
     deviations."""
     axes: tuple[str, ...] = ()
     """Displayed names of the driven axes; empty = x, y, z."""
+    reading_units: Mapping[str | None, str] = field(default_factory=dict)
+    """Units of the response, by the channel's name in candidates; None: of all channels, where they have the same."""
     proposal: "Proposal | None" = None
     """Proposed next recording, where rivals fit as well as the named effects; None = no proposal."""
     balance_errors: tuple[BalanceErrors, ...] = ()

@@ -73,7 +73,7 @@ def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Lab
     """Make the effects of the final hypothesis with parameters, rivals and probabilities. errors: (parameters,),
     standard errors of the coordinates of the hypothesis's point (`compute_interval_errors`)."""
     hypothesis, effects, start = explanation.after.fitted.hypothesis, [], 0
-    shares = compute_step_shares(explanation.retuned, explanation.steps)
+    shares = _average_over_rounds(explanation, compute_step_shares(explanation.retuned, explanation.steps))
     for claim_index, claim in enumerate(hypothesis.claims):
         coordinate_count = claim.group_count * sum(not parameter.fixed for parameter in claim.effect.parameters)
         rivals, probability = _list_rivals(explanation, claim_index, labels)
@@ -93,6 +93,12 @@ def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Lab
         )
         start += coordinate_count
     return tuple(effects)
+
+
+def _average_over_rounds(explanation: Explanation, shares: Sequence[float]) -> tuple[float, ...]:
+    """Average the shares of effects that were added in one round (an antisymmetric pair), whose order is arbitrary."""
+    rounds = explanation.rounds[: len(shares)]
+    return tuple(float(np.mean([shares[k] for k in range(len(rounds)) if rounds[k] == added])) for added in rounds)
 
 
 def find_axis_letter(claim: Claim, labels: Labels) -> str | None:

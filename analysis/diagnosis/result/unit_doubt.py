@@ -1,6 +1,9 @@
 """Sentences on likely errors of a unit or a sign: a channel differs from the model's prediction by a constant factor
 only, or the command is not a force.
 
+Windows start from the measured motion and therefore follow it in any unit. There, the force that the model needs along
+the motion is compared with the applied one (`predict_forces`).
+
 A wrong unit or reversed wiring is more likely than a device with such a response. Thresholds: `UNIT_FACTOR` on the
 ratio of amplitudes, `UNIT_CORRELATION` on the correlation coefficient.
 """
@@ -9,15 +12,69 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.limits import UNIT_CORRELATION, UNIT_FACTOR
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.findings import TimeSeries
+from equalizer.effects.placing import place_recorded_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 
+COMMAND, MOTION = "the command's", "the motion's"
+"""The other signal whose unit may be wrong, where the compared channels are responses, and where they are forces."""
 
-def describe_unit_doubts(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
+
+def describe_measured_doubts(
+    measure: ErrorMeasure, model: MechanicalModel, floors: Sequence[NoiseFloor], time_series: Sequence[TimeSeries]
+) -> tuple[str, ...]:
+    """Describe the doubts in the compared signals and, for windows, in the forces. time_series: of the measure."""
+    return (
+        *describe_unit_doubts(time_series, MOTION if measure.name == "predicted force" else COMMAND),
+        *describe_unit_doubts(predict_forces(measure, model, floors), MOTION),
+    )
+
+
+def predict_forces(
+    measure: ErrorMeasure, model: MechanicalModel, floors: Sequence[NoiseFloor]
+) -> tuple[TimeSeries, ...]:
+    """Predict, per record of windows, the force that the model needs along the measured motion; measured is the applied
+    one. floors: noise of each record. Empty for other measures, and where the motion does not determine the force."""
+    records = measure.records
+    if not measure.name.startswith("windows") or not all(has_motion(record.recording, model) for record in records):
+        return ()
+    # Imported here: most diagnoses compare no forces.
+    from analysis.diagnosis.forces.force_measure import build_predicted_force_measure
+
+    try:
+        forces = build_predicted_force_measure(records, model, floors).measure
+        residuals = forces.residuals(model, place_recorded_effects(model, records[0].recording))
+    except np.linalg.LinAlgError:
+        return ()
+    series = []
+    for record, residual in zip(forces.records, residuals, strict=True):
+        is_used = record.fit | record.choose | record.test
+        measured, command = record.measured[is_used], record.recording.command
+        predicted = measured - residual[is_used] * forces.unit
+        series.append(
+            TimeSeries(
+                "",
+                command.sample_rate_hz,
+                command.channels,
+                command.units,
+                measured,
+                predicted,
+                predicted,
+                predicted,
+                (),
+            )
+        )
+    return tuple(series)
+
+
+def describe_unit_doubts(time_series: Sequence[TimeSeries], other: str = COMMAND) -> tuple[str, ...]:
     """Describe, in a sentence each, the channels whose measurement differs from the given model's prediction by a
     factor of at least `UNIT_FACTOR` or at most its reciprocal, or by its sign, while both correlate well
-    (`UNIT_CORRELATION`); the factor is that of the first such recording."""
+    (`UNIT_CORRELATION`); the factor is that of the first such recording. other: see `COMMAND`."""
     factors: dict[str, float] = {}
     for series in time_series:
         for channel, name in enumerate(series.channels):
@@ -26,7 +83,7 @@ def describe_unit_doubts(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
                 factors.setdefault(name, factor)
     return tuple(
         f"{name} has the shape that the model predicts, but {_describe_factor(factor)}: its "
-        f"{_name_likely_error(factor)}, the command's or one in the model may be wrong."
+        f"{_name_likely_error(factor)}, {other} or one in the model may be wrong."
         for name, factor in factors.items()
     )
 

@@ -118,10 +118,10 @@ def write_answer(findings: Findings) -> str:
 
 
 def extract_device(findings: Findings) -> DeviceWording:
-    """Extract the properties of the device that sentences need, from the given model and the noise floor."""
-    return DeviceWording(
-        findings.given.inputs == 1, findings.given.system, "" if findings.floor is None else findings.floor.method
-    )
+    """Extract the properties of the device that sentences need, from the given model, the noise floor and the units of
+    the readings."""
+    noise_method = "" if findings.floor is None else findings.floor.method
+    return DeviceWording(findings.given.inputs == 1, findings.given.system, noise_method, findings.reading_units)
 
 
 def describe_rivals(effect: NamedEffect) -> tuple[str, ...]:

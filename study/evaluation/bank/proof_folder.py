@@ -1,13 +1,17 @@
 """Folder layout of a blind test of the diagnosis: its inputs, the sealed labels (ground truth), and the results.
 
 Layout: bank.json (settings of the bank), open/CASE/ (all that the diagnosis gets, and its answer), sealed/NUMBER.json
-(labels), labels.sha256 (seals), engine.log, and begun/ while cases are written. The random name of a case does not
-reveal its number. next/ is the bank of follow-up cases, with the same layout; controls/SEED/ has cases in open/, but no
-labels; a bank of laws has the test motions of each case beside its label."""
+(labels), labels.sha256 (seals), engine.log, bank.lock, and begun/ while cases are written. The random name of a case
+does not reveal its number. next/ is the bank of follow-up cases, with the same layout; controls/SEED/ has cases in
+open/, but no labels; a bank of laws has the test motions of each case beside its label."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from study.errors import StudyError
 from study.store.disk.json_document import parse_json
@@ -39,6 +43,11 @@ class ProofFolder:
     def seals_file(self) -> Path:
         """File with the SHA-256 of each label, in the format of `sha256sum --check`."""
         return self.path / "labels.sha256"
+
+    @property
+    def lock_file(self) -> Path:
+        """File that is locked while a process works on the bank."""
+        return self.path / "bank.lock"
 
     @property
     def log_file(self) -> Path:
@@ -96,3 +105,23 @@ def open_proof_folder(path: Path, seed: int, short_recordings: bool, bank_kind: 
         subfolder.mkdir(parents=True, exist_ok=True)
     write_text(bank_path, document_text)
     return folder
+
+
+@contextmanager
+def hold_proof_folder(folder: ProofFolder) -> Iterator[None]:
+    """Hold the lock of a bank within the context: a second process would remove cases that the first is writing.
+    Raises StudyError, without waiting, where another process holds it."""
+    lock = FileLock(folder.lock_file)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as timeout:
+        raise StudyError(
+            "Another process works on this bank",
+            f"It holds {folder.lock_file}.",
+            "Wait until it has ended, or choose another folder with --out.",
+            saved="Nothing was changed.",
+        ) from timeout
+    try:
+        yield
+    finally:
+        lock.release()

@@ -17,7 +17,7 @@ from analysis.evaluation.blind_test.score import Score, compute_score
 from study.errors import convert_interrupts
 from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
 from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up
-from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, hold_proof_folder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import (
@@ -78,11 +78,12 @@ class BlindTest:
 
 def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> BlindTest:
     """Run the bank in the folder `path`, or continue it after an interruption. on_progress: called with the name of the
-    step, the number done and the total. Raises StudyError where the folder belongs to another bank, a sealed file has
-    changed, or the run is interrupted."""
+    step, the number done and the total. Raises StudyError where the folder belongs to another bank or another process
+    works on it, a sealed file has changed, or the run is interrupted."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
     case_numbers = [case_draw.number for case_draw in list_drawable_cases(plan)]
-    with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
+    saved_text = f"All that is sealed and answered so far is in {path}."
+    with convert_interrupts("The bank is not finished.", saved_text), hold_proof_folder(folder):
         seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(case_numbers)))
         case_names = read_case_names(folder, case_numbers)
         _answer_cases(folder, plan, options, dict(zip(case_names, case_numbers, strict=True)), on_progress)

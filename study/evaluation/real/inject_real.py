@@ -27,6 +27,7 @@ from study.evaluation.bank.proof_folder import (
     RECORDING_FILE,
     SETTINGS_FILE,
     ProofFolder,
+    hold_proof_folder,
     open_proof_folder,
 )
 from study.evaluation.bank.proof_seals import (
@@ -172,10 +173,24 @@ def run_injections(
     """Inject, seal, diagnose and reveal faults in the folder `path`; continues an interrupted test.
 
     count_and_seed: number of cases, and seed of their draws. on_done: called with the numbers of diagnosed cases and of
-    all cases. Raises StudyError, also where a label was changed after it was sealed.
+    all cases. Raises StudyError, also where a label was changed after it was sealed, or another process works on the
+    folder.
     """
     count, seed = count_and_seed
     folder = open_proof_folder(path, seed, False)
+    with hold_proof_folder(folder):
+        return _run_held_injections(folder, injectable_recordings, (count, seed), on_done, workers)
+
+
+def _run_held_injections(
+    folder: ProofFolder,
+    injectable_recordings: Sequence[InjectableRecording],
+    count_and_seed: tuple[int, int],
+    on_done: Callable[[int, int], None],
+    workers: Workers,
+) -> tuple[InjectedOutcome, ...]:
+    """Do the work of `run_injections` in a folder whose lock is held."""
+    count, seed = count_and_seed
     case_names = seal_injections(folder, injectable_recordings, count, seed)
     answered_count = sum(is_answered(folder.open / name) for name in case_names)
     on_done(answered_count, count)

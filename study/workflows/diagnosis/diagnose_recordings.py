@@ -148,10 +148,11 @@ def run_diagnosis(plan: DiagnosePlan, on_progress: Progress, engine: Engine = di
             (f"The fits broke down ({error}): near the given parameters the simulation diverges",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
         ) from error
+    first_remarks = first_model.list_remarks(findings.given, findings.diagnosis.error)
     findings = replace(
         findings,
         improved=add_spring(findings.improved, -spring_n_per_m),
-        remarks=(*inputs.remarks, *describe_spring(spring_n_per_m), *first_model.remarks, *findings.remarks),
+        remarks=(*inputs.remarks, *describe_spring(spring_n_per_m), *first_remarks, *findings.remarks),
     )
     return UnwrittenDiagnosis(
         findings, plan, (*inputs.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))

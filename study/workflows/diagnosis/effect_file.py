@@ -6,6 +6,7 @@ Loading a file runs its code: load only files from a trusted source.
 """
 
 import importlib.util
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -101,25 +102,35 @@ def read_entry(path: Path) -> LawEntry:
     """Load an effect file by running it. Raises StudyError if it does not exist, is no Python file, fails, or defines
     no ENTRY with a valid name that is not in the catalogue."""
     module_spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
-    if module_spec is None or module_spec.loader is None or not path.is_file():
-        raise _make_effect_error(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
+    if not path.is_file() or module_spec is None or module_spec.loader is None:
+        problem = "is no Python file (.py)" if path.is_file() else "is not there"
+        raise _make_effect_error(f"{path} {problem}.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
     module = importlib.util.module_from_spec(module_spec)
     try:
         module_spec.loader.exec_module(module)
-    except Exception as error:
-        raise _make_effect_error(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
+    except (Exception, SystemExit) as error:
+        reason = str(error) or type(error).__name__
+        raise _make_effect_error(f"{path} fails: {reason}.", "Correct it, or leave --effect-file out.") from error
     entry = getattr(module, "ENTRY", None)
     catalogue_names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
-    if (
-        not isinstance(entry, LawEntry)
-        or entry.name in catalogue_names
-        or not EFFECT_NAME_PATTERN.fullmatch(entry.name)
-    ):
+    if not isinstance(entry, LawEntry) or entry.name in catalogue_names or not _has_valid_fields(entry):
         raise _make_effect_error(
-            f"{path} defines no ENTRY with a valid name that is not in the catalogue.",
+            f"{path} defines no ENTRY with a valid name that is not in the catalogue and a Law of finite numbers.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",
         )
     return entry
+
+
+def _has_valid_fields(entry: LawEntry) -> bool:
+    """Whether the fields of an entry, which a user may have changed, are of their types, its name is valid, and the
+    numbers of its law are finite."""
+    texts: tuple[object, ...] = (entry.name, entry.source, entry.signature)
+    law: object = entry.law
+    if not all(isinstance(text, str) for text in texts) or not isinstance(law, Law):
+        return False
+    numbers: tuple[object, ...] = law.numbers
+    are_finite = (isinstance(number, int | float) and math.isfinite(number) for number in numbers)
+    return bool(EFFECT_NAME_PATTERN.fullmatch(entry.name)) and all(are_finite)
 
 
 def _read_laws(source: Path) -> list[Law]:

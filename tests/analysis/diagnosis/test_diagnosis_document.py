@@ -55,6 +55,10 @@ def test_a_diagnosis_goes_to_json_and_back():
     assert diagnosis_from_json(diagnosis_to_json(diagnosis)) == diagnosis
 
 
+def test_the_schema_says_that_the_retuned_parameters_are_changes():
+    assert build_diagnosis_schema()["properties"]["retuned"]["description"].startswith("Changes of the model's own")
+
+
 def test_the_returned_set_is_the_effect_and_its_inseparable_rivals():
     assert diagnosis_from_json(DOCUMENT).returned_set == ("coulomb_friction", "body_in_a_box")
 

@@ -34,7 +34,13 @@ def test_a_constant_response_is_wrong_and_a_constant_command_is_reported(make_re
     assert [(check.level, check.finding) for check in found] == [
         ("notice", "command 'f2' is 0 N throughout."), ("wrong", "response 'a1' is 2.5 m/s^2 throughout."),
     ]  # fmt: skip
+    assert "leave it out" in found[0].advice
     assert check_constant_channels(list_channels(make_recording(draw_noise(1), draw_noise(2))))[0].level == "fine"
+
+
+def test_the_zero_command_of_a_free_motion_is_to_be_kept(make_recording, draw_noise):
+    (check,) = check_constant_channels(list_channels(make_recording(np.zeros(N), draw_noise(1))))
+    assert check.advice.startswith("In a free motion, such as a decay, keep it")
 
 
 @pytest.mark.parametrize(

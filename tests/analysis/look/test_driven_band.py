@@ -49,6 +49,12 @@ def test_a_command_that_rests_is_not_driven_and_said(make_recording, make_noise)
     assert [band.command for band in bands] == ["f1"]
     checks = check_driven_axes(found, bands)
     assert (checks[0].level, checks[0].finding) == ("notice", "command 'f2' is not driven.")
+    assert "leave it out" in checks[0].advice
+
+
+def test_the_zero_command_of_a_free_motion_is_to_be_kept(make_recording, make_noise):
+    (check,) = check_driven_axes(make_recording(np.zeros(20_000), make_noise()), ())
+    assert check.advice.startswith("In a free motion, such as a decay, keep it")
 
 
 @pytest.mark.parametrize("noise_share", [0.0, 0.2, 0.5])

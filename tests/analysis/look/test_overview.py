@@ -39,3 +39,11 @@ def test_a_recording_of_any_length_can_be_looked_at(make_recording, n, fill):
     assert isinstance(found.recording, Recording)
     assert len(found.summaries) == 6
     assert all(check.finding.endswith(".") for check in found.checks)
+
+
+def test_without_spectra_no_command_is_called_undriven(make_recording, make_noise):
+    response = make_noise(2000)
+    response[::10] = np.nan
+    overview = make_overview("gaps.h5", make_recording(make_noise(2000, seed=2), response))
+    assert overview.spectra is None
+    assert not any("is not driven" in check.finding for check in overview.checks)

@@ -4,8 +4,12 @@ import json
 
 import pytest
 
+from analysis.psychophysics.power.power_curve import PowerPoint, Share
+from analysis.psychophysics.power.simulated_study import Crowd
 from study.cli.main import main
-from study.workflows.planning.simulate_power import PROGRESS_NAME
+from study.cli.power import _format_table
+from study.workflows.planning.simulate_power import PROGRESS_NAME, PowerPlan
+from tests.analysis.conftest import PUBLISHED
 
 ASKED = ("power", "--subjects", "3", "--studies", "10", "--workers", "1", "--effect-db", "0", "--seed", "4")
 
@@ -70,3 +74,12 @@ def test_a_protocol_that_roves_its_levels_is_simulated_so_and_it_is_said(tmp_pat
     assert main(["power", "--compare", "--studies", "10", *mine, "--people", "repeating"]) == 0
     said = capsys.readouterr().out
     assert "Roved by 6 dB" in said and "people are attentive" in said
+
+
+@pytest.mark.parametrize(("medians_n", "is_told"), [((0.7, 5.0), False), ((20.0, 28.0), True)])
+def test_where_both_medians_are_above_the_cap_it_is_told_what_counts_as_not_covered(medians_n, is_told):
+    """Coverage was about 0 without a word, where a report gives no interval at all."""
+    share = Share(0.0, 0.0, 0.1)
+    points = [PowerPoint(5, 10, 300.0, share, share, share, share, 0.0, 0.0)]
+    lines = _format_table(points, PowerPlan(Crowd((5.0, 45.0), medians_n), PUBLISHED, (5,), 10, 1))
+    assert any("this counts as not found and not covered" in line for line in lines) == is_told

@@ -17,7 +17,7 @@ from analysis.evaluation.laws.law_score import LawScore, compute_law_score
 from study.errors import convert_interrupts
 from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
 from study.evaluation.bank.laws.seal_laws import get_fresh_motions_path, read_fresh_motions, seal_laws
-from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, hold_proof_folder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
 from study.evaluation.bank.sealed_bank import (
     BankOptions,
@@ -55,7 +55,8 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
     on_progress: called with the step ("sealing" or "diagnosing"), the number of finished cases, and of all cases.
     """
     folder = open_proof_folder(path, plan.seed, plan.brief, LAW_BANK_KIND)
-    with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
+    saved_text = f"All that is sealed and answered so far is in {path}."
+    with convert_interrupts("The bank is not finished.", saved_text), hold_proof_folder(folder):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         case_names = read_case_names(folder, range(plan.cases))
         diagnosable_names = [

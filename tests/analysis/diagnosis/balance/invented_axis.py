@@ -146,5 +146,5 @@ def record_imposed_motion(physics, seed=1, *, seconds=12.0, rate_hz=500.0, trave
     force += force_noise * force.std() * random.standard_normal(count)
     return replace(
         make_recording(force[:, None], q[:, None], rate_hz, Hold.BAND_LIMITED),
-        meta={"record_imposed_motion": "position"},
+        meta={"imposed": "position"},
     )

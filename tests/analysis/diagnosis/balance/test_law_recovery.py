@@ -82,6 +82,11 @@ def test_where_the_motion_is_imposed_and_the_force_is_read(axis_module, find_bal
     check_imposed_motion(axis_module, find_balance, effect)
 
 
+def test_where_the_motion_is_imposed_no_law_of_an_actuator_is_tried(axis_module, find_balance):
+    (balance,) = find_balance(axis_module.record_imposed_motion(axis_module.Physics(), seconds=6.0, rate_hz=250.0))
+    assert "amplifier_lag" not in {law.effect for law in balance.search.regression.laws}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", [effect for effect in TRUTHS if effect not in OPEN])
 def test_every_law_in_an_open_loop(axis_module, find_balance, effect):

@@ -138,6 +138,17 @@ def test_a_shuffled_force_holds_no_law(seed=9):
     assert any("vx" not in each.variables for each in found.sums)  # the grammar without it was asked
 
 
+def test_terms_begin_at_the_same_numbers_in_either_order_of_the_recordings(seed=9):
+    context, known = arena_of(recorded((DRAG,), seed))
+    fitted = evaluate_fit(context.measure, context.tuning, known.retuned.fitted.deviations, NO_EFFECTS)
+    view = build_views(context.measure, context.tuning, fitted)[0]
+    (record,) = view.records
+    louder = {name: 2.0 * column for name, column in record.columns.items()}
+    records = record, replace(record, columns=louder, missing_force=2.0 * record.missing_force)
+    terms, reversed_terms = (list_view_terms(replace(view, records=order)) for order in (records, records[::-1]))
+    assert terms == reversed_terms == list_view_terms(replace(view, records=records[1:]))
+
+
 def test_axes_are_called_as_the_recording_does():
     """Its only axis is y: the grammar calls it x."""
     recording = recorded((), 3)

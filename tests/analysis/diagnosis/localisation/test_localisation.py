@@ -76,8 +76,22 @@ def test_an_error_of_the_position_is_not_sought_in_a_response_of_the_same_name(m
     for is_position_error, states in ((True, ()), (False, (RUBS,))):
         best = replace(OF_AX, axis="x", is_position_error=is_position_error)
         entry = EntryPoint((best, ALONG_X), None, 60)
-        cells = (SimpleNamespace(beyond_noise=True),)
+        cells = (SimpleNamespace(beyond_noise=True, part=0, in_noise=9.0),)
         assert find_state_dependences(measure, None, None, cells, entry, (SimpleNamespace(),)) == states
+
+
+def test_states_are_those_of_the_recording_with_the_largest_error_in_either_order(monkeypatch):
+    monkeypatch.setattr("analysis.diagnosis.localisation.localisation.find_force_states", lambda *of: of[:2])
+    small, large = ((SimpleNamespace(recording=name), f"evidence of {name}", name) for name in ("small", "large"))
+    for order in ((small, large), (large, small)):
+        measure = SimpleNamespace(records=tuple(record for record, _, _ in order))
+        cells = tuple(
+            SimpleNamespace(beyond_noise=True, part=part, in_noise={"small": 2.0, "large": 9.0}[name])
+            for part, (_, _, name) in enumerate(order)
+        )
+        evidence = tuple(of_record for _, of_record, _ in order)
+        tuning = SimpleNamespace(model=SimpleNamespace(system=None))
+        assert find_state_dependences(measure, tuning, None, cells, None, evidence) == ("evidence of large", "large")
 
 
 def test_states_are_said_with_share_and_chance():

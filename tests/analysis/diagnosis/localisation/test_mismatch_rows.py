@@ -18,7 +18,7 @@ def make_state(share, p_value):
 
 
 def test_rows_come_by_what_they_miss_of_the_signal_and_only_where_significant():
-    rows = list_mismatch_rows([make_cell(0.1), make_cell(0.3), make_cell(0.9, p_value=0.02)])
+    rows = list_mismatch_rows([make_cell(0.1, amplitude=2.0), make_cell(0.3), make_cell(0.9, p_value=0.02)])
     assert [row.share for row in rows] == [0.3, 0.1]
     assert rows[0].state is None
     assert rows[0].amplitude == 1.0
@@ -47,7 +47,17 @@ def test_a_level_that_is_not_known_is_none():
 
 
 def test_no_more_rows_are_kept_than_a_page_holds():
-    rows = list_mismatch_rows([make_cell(0.1 + k / 1000) for k in range(100)], [make_state(0.01, 1e-4)])
+    rows = list_mismatch_rows(
+        [make_cell(0.1 + k / 1000, amplitude=1.0 + k) for k in range(100)], [make_state(0.01, 1e-4)]
+    )
     assert len(rows) == MOST_ROWS
     assert rows[0].state == "near v = 0"
     assert list_mismatch_rows([]) == ()
+
+
+def test_parts_with_the_same_mismatch_are_one_row():
+    """A row does not name its part; the share is that of all parts together."""
+    parts = [replace(make_cell(share), part=part) for part, share in enumerate((0.3, 0.4))]
+    (row,) = list_mismatch_rows(parts)
+    assert row.share == pytest.approx((0.5 * (0.3**2 + 0.4**2)) ** 0.5)
+    assert len(list_mismatch_rows([*parts, make_cell(0.3, amplitude=2.0)])) == 2

@@ -88,6 +88,19 @@ def test_a_number_of_an_unknown_unit_of_the_reading_has_no_unit():
     assert format_candidate(nonlinear, DEVICE) == "a nonlinear sensor in the x channel, cubic term 0.0200"
 
 
+@pytest.mark.parametrize(
+    ("effect", "parameters", "said"),
+    [
+        ("sensor_offset", {"offset": 0.5}, "a sensor offset in the x channel, 0.500 m/s²"),
+        ("sensor_play", {"gap": 0.5}, "play before the sensor in the x channel, a gap of 0.500 m/s²"),
+        ("sensor_gain", {"gain": 1.1}, "a wrong sensor gain in the x channel, a factor of 1.10"),
+    ],
+)
+def test_a_number_of_a_sensor_has_the_unit_of_its_reading(effect, parameters, said):
+    candidate = replace(DRY, effect=effect, place="sensor", parameters=parameters)
+    assert format_candidate(candidate, replace(DEVICE, reading_units={"x": "m/s^2", "y": "m"})) == said
+
+
 def test_a_law_is_a_candidate_with_its_formula():
     law = FoundLaw("-0.12*tanh(vx/0.001)", ("vx",), "force", "x")
     drag = replace(DRY, effect="discovered_law", parameters={"p0": -0.12, "p1": 0.001}, law=law)

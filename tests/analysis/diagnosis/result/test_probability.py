@@ -1,9 +1,15 @@
 """How likely fitted_candidates are, from how far apart they stand."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from analysis.diagnosis.limits import NO_CANDIDATE_LEAST, NO_CANDIDATE_MOST
-from analysis.diagnosis.result.named_effects import compute_none_probability, compute_probabilities
+from analysis.diagnosis.result.named_effects import (
+    _average_over_rounds,
+    compute_none_probability,
+    compute_probabilities,
+)
 
 
 def test_of_no_candidates_none_has_a_probability():
@@ -54,3 +60,10 @@ def test_a_small_share_of_a_strong_mismatch_is_no_sign_of_another_effect():
     assert compute_none_probability(2.0, 0.01) < 0.1 < 0.5 < compute_none_probability(2.0, 0.5)
     assert compute_none_probability(2.0, 0.5) == compute_none_probability(2.0)
     assert compute_none_probability(1.02, 0.9) == compute_none_probability(1.02)
+
+
+def test_two_forces_that_were_added_as_a_pair_have_equal_shares(make_candidate):
+    pair, single = (make_candidate(1.0, "force_gain"),), (make_candidate(1.0, "added_mass"),)
+    explanation = SimpleNamespace(rounds=(single, pair, tuple(pair), single[:0]))
+    assert _average_over_rounds(explanation, (0.4, 0.02, 0.5)) == pytest.approx((0.4, 0.26, 0.26))
+    assert _average_over_rounds(SimpleNamespace(rounds=()), ()) == ()

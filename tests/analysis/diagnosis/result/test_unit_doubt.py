@@ -1,8 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.result.findings import TimeSeries
-from analysis.diagnosis.result.unit_doubt import describe_unit_doubts
+from analysis.diagnosis.result.unit_doubt import MOTION, describe_unit_doubts, predict_forces
+from tests.analysis.diagnosis.errors.drifting_plant import make_model, random_course, record_plant
 
 WAVE = np.random.default_rng(1).standard_normal((500, 1))
 
@@ -49,3 +53,19 @@ def test_missing_samples_are_passed_over():
     gaps = 1000 * WAVE
     gaps[10:20] = np.nan
     assert len(describe_unit_doubts([make_series(gaps)])) == 1
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(1000.0, " times smaller"), (-1.0, "with the other sign"), (1.0, "")],
+    ids=["millimetres", "sign", "right"],
+)
+def test_windows_follow_the_motion_in_any_unit_but_the_force_does_not(factor, words):
+    """A drifting carriage, compared in windows that start from its measured motion."""
+    drifting = record_plant(9.0 * random_course(12.0, 5), controlled=False)
+    scaled = replace(drifting, response=replace(drifting.response, samples=factor * drifting.response.samples))
+    chosen, model = make_measure([scaled], make_model()), make_model()
+    assert chosen.measure.name == "windows of 1 s"
+    doubts = describe_unit_doubts(predict_forces(chosen.measure, model, chosen.floors), MOTION)
+    assert len(doubts) == (1 if words else 0)
+    assert all(words in doubt and doubt.endswith("the motion's or one in the model may be wrong.") for doubt in doubts)

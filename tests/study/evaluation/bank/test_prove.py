@@ -11,7 +11,13 @@ import pytest
 
 from study.errors import StudyError, UserInterruptError
 from study.evaluation.bank import answer_cases
-from study.evaluation.bank.proof_folder import ANSWER_FILE, RECORDING_FILE, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import (
+    ANSWER_FILE,
+    RECORDING_FILE,
+    ProofFolder,
+    hold_proof_folder,
+    open_proof_folder,
+)
 from study.evaluation.bank.proof_seals import read_answer, seal
 from study.evaluation.bank.proof_summary import format_blind_test, summarise_blind_test
 from study.evaluation.bank.prove import make_outcome, prove
@@ -139,6 +145,17 @@ def copied(proof, tmp_path):
     folder = ProofFolder(tmp_path / "copy")
     subprocess.run(["cp", "-r", str(proof[0].folder.path), str(folder.path)], check=True)
     return folder
+
+
+def test_a_second_process_on_the_same_bank_is_refused_and_changes_nothing(copied):
+    """It once removed the cases that the first was writing, and replaced its answers by failures."""
+    begun = copied.unfinished / "a1b2"
+    begun.mkdir(parents=True)
+    with hold_proof_folder(copied), pytest.raises(StudyError, match="Another process works on this bank"):
+        prove(copied.path, PLAN, BankOptions(), lambda *_: None)
+    assert begun.exists()
+    prove(copied.path, PLAN, BankOptions(), lambda *_: None)
+    assert not begun.exists()
 
 
 def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):

@@ -75,6 +75,31 @@ def test_a_file_that_is_no_effect_is_refused(tmp_path, text, said):
         read_entry(tmp_path / "mine.py")
 
 
+@pytest.mark.parametrize(
+    ("changed", "into", "said"),
+    [
+        ("name='mine'", "name=5", "defines no ENTRY"),
+        ("source='found", "source=5 or 'found", "defines no ENTRY"),
+        ("numbers=(60.0, 1.5)", "numbers=('a', 1.5)", "defines no ENTRY"),
+        ("numbers=(60.0, 1.5)", "numbers=(float('nan'), 1.5)", "defines no ENTRY"),
+        ("ENTRY = LawEntry(", "raise SystemExit\nENTRY = LawEntry(", "fails: SystemExit"),
+    ],
+)
+def test_a_file_that_was_changed_by_hand_is_refused_with_its_reason(model_file, tmp_path, changed, into, said):
+    path = tmp_path / "mine.py"
+    write_entry(model_file, path)
+    assert changed in path.read_text()
+    path.write_text(path.read_text().replace(changed, into))
+    with pytest.raises(StudyError, match=said):
+        read_entry(path)
+
+
+def test_a_file_of_another_kind_is_not_said_to_be_missing(tmp_path):
+    (tmp_path / "law.txt").write_text("x = 1\n")
+    with pytest.raises(StudyError, match="is no Python file"):
+        read_entry(tmp_path / "law.txt")
+
+
 def test_at_other_axes_all_letters_turn_along(model_file, tmp_path):
     entry = write_entry(model_file, tmp_path / "drag.py")
     turned = replace(entry, law=parse_law("-2.0*vx*y + 0.1*fz + 0*t", "force", "x"))

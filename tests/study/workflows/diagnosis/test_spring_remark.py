@@ -1,8 +1,11 @@
 """A virtual spring in the model that is compared, and taken off again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from analysis.diagnosis.first_model.first_model import REPLACED_REMARK, FirstModel
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.workflows.diagnosis.diagnose_recordings import add_spring, describe_spring
 
@@ -30,3 +33,12 @@ def test_what_was_done_is_reported():
         "A virtual spring of 137 N/m held the handle at its place. It was added to the model for the comparison, and "
         "is not in improved.toml.",
     )
+
+
+def test_remarks_on_a_first_model_that_was_replaced_are_left_out(two_bodies):
+    first_model = FirstModel(two_bodies, ("The response is positive in the direction opposite to the command.",))
+    other = replace(two_bodies, mass=2 * two_bodies.mass)
+    assert first_model.list_remarks(add_spring(two_bodies, 137.0), "predicted force") == first_model.remarks
+    assert first_model.list_remarks(other, "predicted force") == (REPLACED_REMARK,)
+    assert first_model.list_remarks(other, "free simulation") == first_model.remarks
+    assert FirstModel(two_bodies, ()).list_remarks(other, "predicted force") == ()
