@@ -14,8 +14,11 @@ def ignore_interrupts() -> Iterator[None]:
         yield
         return
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in numbers}
+    # Read before any is replaced: an interruption between two replacements must not leave one ignored for good.
+    handlers = {number: signal.getsignal(number) for number in numbers}
     try:
+        for number in numbers:
+            signal.signal(number, signal.SIG_IGN)
         yield
     finally:
         for number, handler in handlers.items():

@@ -17,13 +17,14 @@ from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, 
 from analysis.diagnosis.effect_words import get_parameter_unit
 from analysis.diagnosis.errors.fit_score import compute_fit_score
 from analysis.diagnosis.limits import CONTRAST_BLOCKS, SAME_DEVICE_EXCESS
+from analysis.diagnosis.localisation.mismatch_maps import summarise_worst_channel
 from analysis.diagnosis.reference.compare_with_reference import Contrast
 from analysis.diagnosis.result.error_table import compute_fit_errors
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.placing import place_recorded_effects, shorten_axis_name
+from equalizer.effects.placing import PlacingError, place_recorded_effects, shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
@@ -163,9 +164,13 @@ def _find_axis_letter(judged_fault: JudgedFault, recording: Recording) -> str | 
 
 def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
     """Make the parameters of the fault with units and 95 % intervals; without an interval where the standard error is
-    0."""
+    0. A required parameter that the fault leaves out is 0: the other share of cross-axis sensitivity, whose shares are
+    compared one at a time."""
     units = _find_units(judged_fault.fault, recording, system)
-    return {
+    entry = EFFECTS_BY_NAME.get(judged_fault.fault.effect)
+    required = () if entry is None else tuple(known.name for known in entry.parameters if not known.optional)
+    missing = {name: Estimate(0.0, units[name]) for name in required if name not in judged_fault.values}
+    return missing | {
         name: Estimate(
             value,
             units.get(name, "1"),
@@ -255,18 +260,22 @@ def _improve_model(model: MechanicalModel, effects: tuple[NamedEffect, ...]) -> 
 
 def simulate_named_fault(findings: Findings, context: SearchContext, recording: Recording) -> Findings:
     """State the errors of a simulation of the given model with the fault that a comparison names, instead of the errors
-    of the comparison's base model; the verdict stays. Unchanged where no fault that can be simulated is named, or the
-    simulation does not confirm it by a smaller error. context: of the given model, which predicts the clean
-    recordings."""
+    of the comparison's base model, and its largest error as the remainder; the verdict stays. Unchanged where no fault
+    is named that can be simulated with the parameters of the comparison, or the simulation does not confirm it by a
+    smaller error. context: of the given model, which predicts the clean recordings."""
     faults, measure = findings.improved.effects[len(findings.given.effects) :], context.full_measure
     if not faults:
         return findings
     model, given = replace(findings.given, effects=faults), findings.explanation.before
-    residuals = measure.residuals(findings.given, place_recorded_effects(model, recording))
+    try:
+        residuals = measure.residuals(findings.given, place_recorded_effects(model, recording))
+    except PlacingError:  # such as a delay below zero
+        return findings
     score = compute_fit_score(measure, residuals)
     if not score.mean_log_error < given.score.mean_log_error:
         return findings
     completed = FittedCandidate(replace(given.fitted, residuals=residuals), score)
     errors = compute_fit_errors(measure, replace(findings.explanation, after=completed))
-    diagnosis = replace(findings.diagnosis, fit=errors, error=measure.name)
+    remainder = summarise_worst_channel(measure, score, completed.fitted)
+    diagnosis = replace(findings.diagnosis, fit=errors, error=measure.name, remainder=remainder)
     return replace(findings, diagnosis=diagnosis, remarks=(SIMULATED, *findings.remarks))

@@ -109,7 +109,7 @@ def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
 
 def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
     """Fit a mode to a peak; None where there are fewer than six (chosen) lines or bins within `reach_octaves` of it,
-    where no single mode fits, or where the peak is not distinct from noise."""
+    where no single mode fits, with or without more powers, or where the peak is not distinct from noise."""
     reach_factor = 2**search.reach_octaves
     peak_lines = lines.select_band(peak.frequency_hz / reach_factor, peak.frequency_hz * reach_factor)
     # A hundred points suffice for a single mode: more lines are averaged in bins, which saves time.
@@ -145,9 +145,9 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
 
 def _compute_interval(draws: FloatArray, misfit: float) -> tuple[float, float]:
     """Compute the 95 % interval of draws (draws,), as the 2.5 % and 97.5 % quantiles, widened on both sides by the
-    misfit (unit of the draws); NaN is left out."""
+    misfit (unit of the draws), but not below 0, which no mode has; NaN is left out."""
     low, high = np.nanquantile(draws, (0.025, 0.975))
-    return float(low) - misfit, float(high) + misfit
+    return max(0.0, float(low) - misfit), float(high) + misfit
 
 
 def _is_same_mode(first: Resonance, second: Resonance) -> bool:

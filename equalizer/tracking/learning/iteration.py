@@ -81,7 +81,8 @@ class IterationSettings:
 
     def extract_band(self, samples: FloatArray) -> FloatArray:
         """Extract the part of samples (N, channels) within the band; samples begin and end at rest, or are noise,
-        except for the sensor's offset and drift, which are removed first."""
+        except for the sensor's offset and drift: the straight line is removed first, with it that part of the motion,
+        which is in the band only where that begins below a few periods per record."""
         return filter_to_band(remove_trend(samples), self.sample_rate_hz, self.band_hz)
 
     @property

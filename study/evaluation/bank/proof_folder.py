@@ -14,6 +14,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from study.errors import StudyError
+from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import parse_json
 from study.store.disk.text_file import read_text, write_text
 
@@ -110,7 +111,7 @@ def open_proof_folder(path: Path, seed: int, short_recordings: bool, bank_kind: 
 @contextmanager
 def hold_proof_folder(folder: ProofFolder) -> Iterator[None]:
     """Hold the lock of a bank within the context: a second process would remove cases that the first is writing.
-    Raises StudyError, without waiting, where another process holds it."""
+    Raises StudyError, without waiting, where another process holds it or the folder is not writable."""
     lock = FileLock(folder.lock_file)
     try:
         lock.acquire(timeout=0)
@@ -121,6 +122,8 @@ def hold_proof_folder(folder: ProofFolder) -> Iterator[None]:
             "Wait until it has ended, or choose another folder with --out.",
             saved="Nothing was changed.",
         ) from timeout
+    except OSError as problem:
+        raise CannotWriteError(folder.lock_file, problem) from problem
     try:
         yield
     finally:

@@ -270,17 +270,17 @@ def _has_newer_version(line: bytes) -> bool:
 
 def _require_in_place(path: Path, descriptor: int) -> None:
     """Raise StudyError unless the open log is still the file at its path: a line would be written into a deleted file,
-    or into a folder that is not the session's any more."""
+    or into a folder that is not the session's any more. Not on Windows, which moves no folder of an open file."""
     try:
-        is_in_place = os.path.samestat(path.stat(), os.fstat(descriptor))
+        is_in_place = os.name == "nt" or os.path.samestat(path.stat(), os.fstat(descriptor))
     except OSError:
         is_in_place = False
     if not is_in_place:
         raise StudyError(
             "The session log is gone",
-            f"While the session ran, {path.name} was moved or deleted, or another file was put in its place: {path}.",
-            "Put the folder back in its place, from where it was moved to or from a copy.",
-            saved="Everything logged before is where the folder was moved to; lost if it was deleted.",
+            f"While the session ran, {path.name} was moved, deleted or replaced, or its disk is out of reach: {path}.",
+            "Connect the disk again, or put the folder back in its place, from where it was moved to or from a copy.",
+            saved="Everything logged before is in that file, wherever it is now; lost if it was deleted.",
         )
 
 

@@ -173,7 +173,7 @@ def _compute_gain_forces(model: IdentifiedModel, reference: FloatArray) -> Float
 
 
 def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
-    """Return forces (N, 3), N, unchanged. Raises StudyError, with the largest possible --scale above the cap."""
+    """Return forces (N, 3), N, unchanged. Raises StudyError; above the cap with the largest --scale that fits."""
     try:
         require_under_cap(forces, plan.cap_n, rate_hz)
     except ForceLimitError as error:

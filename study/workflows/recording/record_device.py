@@ -32,9 +32,10 @@ from study.workflows.recording.recording_metadata import describe_segment, descr
 NOMINAL_RATE_HZ = 1000.0
 """Sample rate (Hz) with which durations are computed before a device is open."""
 
-BYTES_PER_SAMPLE, BYTES_PER_PIECE = 100, 4096
-"""Upper bounds of what a sample and a piece take in the file: four signals of three channels, of 8 bytes and their
-checksums; segment and metadata. Chosen."""
+BYTES_PER_SAMPLE, BYTES_PER_PIECE, BYTES_PER_FILE = 100, 4096, 2**17
+"""Upper bounds of what a sample, a piece and the rest take in the file: four signals of three channels, of 8 bytes and
+their checksums; segment and metadata; structures of HDF5, with the empty part of the chunks of signals that are too
+short for compression (up to 86 kB). Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +117,9 @@ def _reserve_space(plan: RecordingPlan, sample_rate_hz: float) -> Iterator[None]
     where there is none."""
     pieces = make_pieces(plan.protocol, sample_rate_hz)
     sample_count = sum(len(piece.commands) for piece in pieces)
+    size_bytes = BYTES_PER_SAMPLE * sample_count + BYTES_PER_PIECE * len(pieces) + BYTES_PER_FILE
     try:
-        with reserve_space(plan.out, BYTES_PER_SAMPLE * sample_count + BYTES_PER_PIECE * (1 + len(pieces))):
+        with reserve_space(plan.out, size_bytes):
             yield
     except CannotWriteError as error:
         error.saved = "Nothing moved, and nothing was written."

@@ -52,6 +52,10 @@ def _ignore_opened_session(folder: SessionFolder, device: Device) -> None:
     """Do nothing: default of `Participant.on_session_opened`."""
 
 
+RATE_TOLERANCE = 1e-3
+"""Share by which a device may be slower than a stimulus needs: a recorded rate is that of a clock. Chosen."""
+
+
 @dataclass(frozen=True, slots=True)
 class Participant:
     """Ports of the participant at the device: display, hand, clock and requests."""
@@ -86,7 +90,7 @@ class ConductedSitting:
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> ConductedSitting:
     """Open the device, then a new session, and run it. Raises StudyError where device, model, sound output or session
-    cannot be opened, and DeviceError where a required accelerometer is missing."""
+    cannot be opened, and DeviceError where a required accelerometer is missing or the device is too slow."""
     check_model_for_protocol(plan.protocol, plan.model)
     settings = make_device_settings(plan.protocol)
     with (
@@ -135,10 +139,10 @@ def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
 
 def _check_rate(protocol: StudyProtocol, info: DeviceInfo) -> None:
     """Check that each stimulus has `MIN_SAMPLES_PER_PERIOD` at the device's rate; from half the rate on it would be
-    zero or of another frequency. Raises DeviceError otherwise."""
+    zero or of another frequency. Raises DeviceError otherwise, apart from `RATE_TOLERANCE`."""
     probe_hz = protocol.probes.to_hz if protocol.probes.is_enabled else 0.0
     highest_hz = max((*protocol.all_frequencies_hz, probe_hz))
-    if info.sample_rate_hz < MIN_SAMPLES_PER_PERIOD * highest_hz:
+    if info.sample_rate_hz * (1 + RATE_TOLERANCE) < MIN_SAMPLES_PER_PERIOD * highest_hz:
         raise DeviceError(
             "The sitting did not begin: the device is too slow for its protocol",
             f"The {info.name} runs at {info.sample_rate_hz:g} Hz, and {highest_hz:g} Hz need at least "

@@ -166,6 +166,8 @@ def _log_sitting_end(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
     """Log why the sitting ended before the session was finished, and return its end. A force that may still be on is
     named also where a stop ended the sitting, whose own fault is not reported."""
     if outcome.fault is Fault.NONE and sitting.device.fault() is Fault.FORCE_LEFT:
+        with contextlib.suppress(OSError, KeyboardInterrupt):  # said before any disk access; the sitting ends anyway
+            sitting.display.trouble(Fault.FORCE_LEFT.value)
         reason = f"{outcome.end_reason}; {Fault.FORCE_LEFT.value}"
         outcome = replace(outcome, end_reason=reason, fault=Fault.FORCE_LEFT)
     state = stop_masking(_report_busy_voids(write_notes(outcome.state, sitting), sitting), sitting)

@@ -40,7 +40,7 @@ def test_the_path_and_what_to_know_go_to_stdout(run, files):
     code, out, err = run(*files)
     assert code == 0
     assert out.splitlines()[0] == str(files[-1])
-    assert out.splitlines()[1].startswith("Quality not stored")
+    assert out.splitlines()[1].startswith("No quality is stored")
     assert out.splitlines()[2].startswith("As the model itself predicts: error 0.")
     assert err == ""
     assert len(read_trajectory(files[-1]).signal) == 1000

@@ -49,8 +49,8 @@ class LawBlindTest:
 
 def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawBlindTest:
     """Run a bank of laws in the folder `path`, or continue it after an interruption. Raises StudyError where the folder
-    belongs to another bank, a sealed file has changed, or the run is interrupted. Cases without answer and recording
-    are not diagnosed.
+    belongs to another bank or another process works on it, a sealed file has changed, or the run is interrupted. Cases
+    without answer and recording are not diagnosed.
 
     on_progress: called with the step ("sealing" or "diagnosing"), the number of finished cases, and of all cases.
     """

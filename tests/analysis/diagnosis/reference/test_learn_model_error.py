@@ -1,12 +1,14 @@
 """A sound device never is its model; what it differs by is learned, and only more than that is named."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.document import Estimate
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.localisation.model_error_floor import (
     IncomparableRecordingsError,
@@ -17,9 +19,11 @@ from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
     require_same_measure,
 )
+from analysis.diagnosis.result.contrast_findings import _make_estimates, simulate_named_fault
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
-from equalizer.plant.mechanical_model import Tolerance
+from equalizer.plant.mechanical_model import ModelEffect, Tolerance
+from equalizer.signals.unit_system import LINEAR
 
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
 AMONG = ("coulomb_friction", "viscous_damping", "amplifier_lag", "force_gain")
@@ -75,6 +79,24 @@ def test_a_fault_that_comparison_names_has_the_errors_of_a_simulation_that_predi
     assert effect_names(found) == ["force_gain"]
     assert found.diagnosis.error == "free simulation"
     assert errors.after < 1.1 * errors.noise < 0.2 * errors.before
+    # What remains is that of this simulation, too: over the whole band, not the cells of the model without the fault.
+    assert [row.band_hz[0] for row in found.diagnosis.remainder] == [0.0]
+
+
+def test_a_fault_that_cannot_be_simulated_keeps_the_errors_of_the_comparison(diagnosed):
+    given = diagnosed.device(1)
+    improved = replace(given, effects=(ModelEffect("transport_delay", None, {"delay": -1e-3}),))
+    findings = SimpleNamespace(given=given, improved=improved, explanation=SimpleNamespace(before=None))
+    context = SimpleNamespace(full_measure=SimpleNamespace(residuals=None))
+    assert simulate_named_fault(findings, context, diagnosed.recorded(1, (), seed=11)) is findings
+
+
+def test_a_share_that_the_comparison_leaves_out_is_zero():
+    fault = SimpleNamespace(effect="cross_axis_sensitivity", place="sensor", site=0)
+    judged = SimpleNamespace(fault=fault, values={"from_after_next": 0.1}, standard_errors={"from_after_next": 0.0})
+    recording = SimpleNamespace(response=SimpleNamespace(units=("m/s^2",) * 3))
+    estimates = _make_estimates(judged, recording, LINEAR)
+    assert estimates == {"from_next": Estimate(0.0, "1"), "from_after_next": Estimate(0.1, "1")}
 
 
 @pytest.mark.slow

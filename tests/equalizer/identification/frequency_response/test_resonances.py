@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from equalizer.identification.frequency_response import resonances as resonances_module
 from equalizer.identification.frequency_response.resonances import COUPLING, GAIN, ResonanceSearch, find_resonances
 from equalizer.identification.frequency_response.single_mode import fit_single_mode
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
@@ -88,6 +89,11 @@ def test_intervals_hold_the_true_mode_also_beside_other_modes(plants, measuring)
                 held.append((low_hz <= frequency_hz <= high_hz, low <= damping <= high))
     assert len(held) > 35
     assert (np.mean(held, axis=0) >= 0.85).all()
+
+
+def test_no_interval_extends_below_zero():
+    interval = resonances_module._compute_interval(np.array([0.01, 0.02]), 0.1)
+    assert interval == pytest.approx((0.0, 0.12), abs=1e-3)
 
 
 def test_nothing_is_found_where_there_is_only_a_slope(plants, synthetic):

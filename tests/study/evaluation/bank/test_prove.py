@@ -25,7 +25,7 @@ from study.evaluation.bank.seal_cases import BankPlan, list_drawable_cases
 from study.evaluation.bank.sealed_bank import BankOptions, reveal_bank
 from study.evaluation.bank.write_proof import read_current_commit, write_proof, write_table
 from study.evaluation.challenge.draw_bank import draw_case_plan
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.file_errors import CannotWriteError, UnusableFileError
 
 ROOT = Path(__file__).parents[4]
 SEED = 51_401
@@ -156,6 +156,12 @@ def test_a_second_process_on_the_same_bank_is_refused_and_changes_nothing(copied
     assert begun.exists()
     prove(copied.path, PLAN, BankOptions(), lambda *_: None)
     assert not begun.exists()
+
+
+def test_a_lock_that_cannot_be_written_is_told_with_its_reason(tmp_path):
+    (tmp_path / "bank.lock").mkdir()
+    with pytest.raises(CannotWriteError, match="was not written"), hold_proof_folder(ProofFolder(tmp_path)):
+        pass
 
 
 def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):

@@ -80,7 +80,7 @@ def test_repeats_make_it_better_and_say_so_play_by_play(done):
     assert found["noise_floor"] < min(found["errors"])
     assert found["peak_n"] <= 3.0
     lines = format_repeat_lines(done)
-    assert lines[0].startswith("Quality not stored")
+    assert lines[0].startswith("No quality is stored")
     assert lines[1].startswith("As the model itself predicts: error 0.")
     assert f"Play 0: error {100 * found['errors'][0]:.2f} % as measured." in lines
     assert any(line.startswith("Noise alone: ") and line.endswith("the best forces are kept.") for line in lines)

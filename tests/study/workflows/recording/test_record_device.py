@@ -2,6 +2,7 @@
 
 import os
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,10 +96,11 @@ def test_without_space_for_the_file_nothing_is_played(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_reserved_space_is_enough_for_the_file(tmp_path, monkeypatch):
+@pytest.mark.parametrize("segments", [PROTOCOL.segments, PROTOCOL.segments[1:]], ids=["three", "one"])
+def test_the_reserved_space_is_enough_for_the_file(tmp_path, monkeypatch, segments):
     reserved: list[int] = []
     monkeypatch.setattr(os, "posix_fallocate", lambda descriptor, start, size: reserved.append(size))
-    record_device(plan(tmp_path / "r.h5"), lambda _: None)
+    record_device(plan(tmp_path / "r.h5", replace(PROTOCOL, segments=segments)), lambda _: None)
     assert (tmp_path / "r.h5").stat().st_size <= reserved[0]
 
 

@@ -218,13 +218,16 @@ def test_a_force_that_may_remain_is_named_first_however_the_sitting_ends(sitter,
     assert ("hapteq resume" in error.value.do_now) is not is_damaged
 
 
-def test_a_stop_after_which_the_force_may_remain_says_so(sitter, watched):
+def test_a_stop_after_which_the_force_may_remain_says_so(sitter, watched, monkeypatch):
     def leave():
         watched.force_left = True
         return Unanswered("the experimenter stopped the session", ends_sitting=True)
 
-    done = sitter.interrupted(2, leave)
+    participant = sitter.participant(2, leave)
+    monkeypatch.setattr(participant.display, "trouble", watched.calls.append)
+    done = conduct_new(sitter.plan(), "simulated", participant)
     assert (done.end_reason.endswith(Fault.FORCE_LEFT.value), done.fault) == (True, Fault.FORCE_LEFT)
+    assert watched.calls.index(Fault.FORCE_LEFT.value) < watched.calls.index("append session_interrupted")
 
 
 def test_a_session_closed_while_the_force_may_remain_is_sealed_to_its_last_line(sitter, watched, monkeypatch):
