@@ -4,6 +4,7 @@ A recording groups its channels by signal (command, response, position and so on
 its role, name, quantity and unit.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,9 +43,19 @@ class Channel:
         """The samples that are not missing, in order; infinite ones count as missing."""
         return self.samples[np.isfinite(self.samples)]
 
+    @property
+    def is_varying(self) -> bool:
+        """Whether the channel takes more than one value."""
+        return bool(self.finite_samples.size and np.ptp(self.finite_samples) > 0)
+
     def format(self, value: float) -> str:
         """Format a value of this channel as text with its unit."""
         return format_value(value, self.unit)
+
+
+def is_driven(channels: Sequence[Channel]) -> bool:
+    """Whether a command changes."""
+    return any(channel.role == "command" and channel.is_varying for channel in channels)
 
 
 def list_channels(recording: Recording) -> tuple[Channel, ...]:

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.look.channels import Channel, compute_rms
+from analysis.look.channels import Channel, compute_rms, is_driven
 from analysis.look.check import FREE_ADVICE, UNDRIVEN_ADVICE, Check, add_fine_if_none
 from equalizer.signals.signal import FloatArray, find_runs
 
@@ -52,20 +52,18 @@ def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
     constant = [
         channel
         for channel in channels
-        if channel.role not in ("condition", "excitation")
-        and channel.finite_samples.size
-        and np.ptp(channel.finite_samples) == 0
+        if channel.role not in ("condition", "excitation") and channel.finite_samples.size and not channel.is_varying
     ]
-    is_driven = any(channel.role == "command" and channel not in constant for channel in channels)
-    checks = tuple(_report_constant_channel(channel, is_driven) for channel in constant)
+    advice = UNDRIVEN_ADVICE if is_driven(channels) else FREE_ADVICE
+    checks = tuple(_report_constant_channel(channel, advice) for channel in constant)
     return add_fine_if_none(CONSTANT_CHECK, checks, "Every command and every sensor changes.")
 
 
-def _report_constant_channel(channel: Channel, is_driven: bool) -> Check:
-    """Report a constant channel: a notice for a command, "wrong" for a sensor. is_driven: whether a command changes."""
+def _report_constant_channel(channel: Channel, command_advice: str) -> Check:
+    """Report a constant channel: a notice for a command, with its advice, "wrong" for a sensor."""
     text = f"{channel.label} is {channel.format(float(channel.finite_samples[0]))} throughout."
     if channel.role == "command":
-        return Check(CONSTANT_CHECK, "notice", text, UNDRIVEN_ADVICE if is_driven else FREE_ADVICE)
+        return Check(CONSTANT_CHECK, "notice", text, command_advice)
     return Check(
         CONSTANT_CHECK, "wrong", text, "Check the cable and the map: a working sensor is never exactly constant."
     )

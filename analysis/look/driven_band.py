@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.look.channels import Channel
+from analysis.look.channels import Channel, is_driven, list_channels
 from analysis.look.check import FREE_ADVICE, UNDRIVEN_ADVICE, Check
 from analysis.look.cross_spectra import CrossSpectra
 from equalizer.signals.recording import Recording
-from equalizer.signals.recording_checks import find_unusable_channels
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_CHECK, COHERENCE_CHECK = "driven axes", "coherence"
@@ -64,7 +63,7 @@ def find_driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tup
     driven are left out."""
     role = (
         "excitation"
-        if any(_is_varying(candidate) and candidate.role == "excitation" for candidate in channels)
+        if any(candidate.is_varying and candidate.role == "excitation" for candidate in channels)
         else "command"
     )
     bands = []
@@ -80,11 +79,6 @@ def find_driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tup
         lines = spectra.frequency_hz[power > LEAST_RELATIVE_DENSITY * power.max()]
         bands.append(DrivenBand(channels[index].name, float(lines[0]), float(lines[-1])))
     return tuple(bands)
-
-
-def _is_varying(channel: Channel) -> bool:
-    """Whether the channel takes more than one value."""
-    return bool(channel.finite_samples.size and np.ptp(channel.finite_samples) > 0)
 
 
 def estimate_coherences(
@@ -104,7 +98,7 @@ def estimate_coherences(
     in_band = (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high)
     coherences = []
     for index, channel in enumerate(channels):
-        if channel.role == "response" and _is_varying(channel):
+        if channel.role == "response" and channel.is_varying:
             multiple = _estimate_multiple_coherence(spectra, inputs, index)
             power = spectra.get_power_density(index)[in_band]
             worst_hz, worst = _find_worst_octave(spectra.frequency_hz[in_band], multiple[in_band], power)
@@ -154,8 +148,7 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand] | None) 
     amplitude without excitation, and a "fine" check with all driven bands, if any. bands: None = not known, because no
     spectra were computed; no command is then called undriven."""
     driven_names = set(recording.command.channels) if bands is None else {band.command for band in bands}
-    unusable_count = len(list(find_unusable_channels([recording.command])))
-    advice = UNDRIVEN_ADVICE if unusable_count < len(recording.command.channels) else FREE_ADVICE
+    advice = UNDRIVEN_ADVICE if is_driven(list_channels(recording)) else FREE_ADVICE
     undriven_commands = [name for name in recording.command.channels if name not in driven_names]
     checks = [Check(DRIVEN_CHECK, "notice", f"command '{name}' is not driven.", advice) for name in undriven_commands]
     checks += [

@@ -75,12 +75,19 @@ def _tabulate_distortion(findings: Findings) -> Table | None:
     kinds = [kind for kind in _KINDS_IN_ORDER if any(distortion.kind == kind for distortion in responding_cells)]
     cells_by_row: dict[tuple[str, str, str, float], dict[Kind, Distortion]] = {}
     for responding_cell in responding_cells:
-        cells_by_row.setdefault(
-            (responding_cell.output, responding_cell.quantity, responding_cell.input, responding_cell.amplitude), {}
-        )[responding_cell.kind] = responding_cell
+        row_key = (
+            responding_cell.output,
+            responding_cell.quantity,
+            responding_cell.input,
+            responding_cell.amplitude,
+        )
+        row = cells_by_row.setdefault(row_key, {})
+        # Of several recordings at this level, the most significant cell counts.
+        row[responding_cell.kind] = min(
+            responding_cell, row.get(responding_cell.kind, responding_cell), key=lambda cell: cell.p_value
+        )
     if not cells_by_row:
         return None
-    noise_rms = _collect_noise_rms(findings)
     return Table(
         "Noise and distortion, per cent of the response there",
         ("Channel", "Driven by", "Level", "Noise", *(_KIND_NAMES[kind] for kind in kinds)),
@@ -89,12 +96,10 @@ def _tabulate_distortion(findings: Findings) -> Table | None:
                 output,
                 input_name,
                 f"{amplitude:g}",
-                _format_share_of_signal(
-                    noise_rms.get((output, quantity)), next(iter(distortion_by_kind.values())).signal_rms
-                ),
+                _format_noise(next(iter(distortion_by_kind.values()))),
                 *(_format_distortion(distortion_by_kind.get(kind)) for kind in kinds),
             )
-            for (output, quantity, input_name, amplitude), distortion_by_kind in cells_by_row.items()
+            for (output, _, input_name, amplitude), distortion_by_kind in cells_by_row.items()
         ),
         (
             "Root-mean-square over the driven band. <: below the detection limit, which is stated. "
@@ -116,22 +121,14 @@ def _is_responding(cell: Distortion, cells: Sequence[Distortion]) -> bool:
     return cell.signal_rms > _LEAST_RESPONSE_RATIO * max(compared_signal_rms)
 
 
-def _collect_noise_rms(findings: Findings) -> dict[tuple[str, str], float]:
-    """Collect the noise rms by channel and quantity; empty without a noise estimate or time series. The cells list the
-    channels in the order of the noise estimate: responses, then positions."""
-    if findings.floor is None or not findings.time_series:
-        return {}
-    channel_rms = [
-        *findings.floor.response_rms,
-        *(() if findings.floor.position_rms is None else findings.floor.position_rms),
-    ]
-    channel_keys = dict.fromkeys((cell.output, cell.quantity) for cell in findings.localisation.distortions.cells)
-    return {channel_key: float(noise_rms) for channel_key, noise_rms in zip(channel_keys, channel_rms, strict=False)}
+def _format_noise(cell: Distortion) -> str:
+    """Format the noise of a cell's channel as a share of the signal; `MISSING` where it is unknown."""
+    return MISSING if np.isnan(cell.noise_rms) else _format_share_of_signal(cell.noise_rms, cell.signal_rms)
 
 
-def _format_share_of_signal(rms: float | None, signal_rms: float) -> str:
-    """Format an rms as a share of the signal's; `MISSING` where it is unknown (None or NaN), or without a signal."""
-    return MISSING if rms is None or not np.isfinite(rms) or not signal_rms > 0 else format_share(rms / signal_rms)
+def _format_share_of_signal(rms: float, signal_rms: float) -> str:
+    """Format an rms as a share of the signal's; `MISSING` without a signal."""
+    return format_share(rms / signal_rms) if signal_rms > 0 else MISSING
 
 
 def _format_distortion(cell: Distortion | None) -> str:

@@ -50,7 +50,7 @@ def estimate_held_out_gain(
         return None
     # Each channel in units of its residual without the effect, so that no channel dominates.
     channel_powers = np.maximum(powers_without.sum(axis=0), np.finfo(float).tiny)
-    counted = _find_channels_above_noise(measure, np.maximum(powers_without, powers_with).sum(axis=0))
+    counted = _find_channels_above_noise(measure, np.maximum(powers_without.sum(axis=0), powers_with.sum(axis=0)))
     scaled_without, scaled_with = (
         (powers_without / channel_powers)[:, counted].mean(axis=1),
         (powers_with / channel_powers)[:, counted].mean(axis=1),

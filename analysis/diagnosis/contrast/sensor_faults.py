@@ -99,10 +99,9 @@ def make_sensor_faults(index: int, name: str, parts: Sequence[Part], lags: Lags)
     yield channel.make_fault("sensor_nonlinearity", [_make_power_law(channel, share, 3, "cubic") for share in shares])
     yield channel.make_fault("sensor_asymmetry", [_make_power_law(channel, share, 2, "square") for share in shares])
     yield channel.make_fault("sensor_play", [_make_backlash(channel, share * channel.std) for share in BACKLASH_SHARES])
-    for other_channel in range(longest_part.response.shape[1]):
-        if other_channel != index:
-            is_after_next = (other_channel - index) % longest_part.response.shape[1] == 2
-            yield _make_cross_axis_fault(channel, other_channel, "from_after_next" if is_after_next else "from_next")
+    for source in (*range(index), *range(index + 1, count := longest_part.response.shape[1])):
+        names = ("from_next", "from_after_next")[:: -1 if (source - index) % count == 2 else 1]
+        yield _make_cross_axis_fault(channel, source, *names)
 
 
 def make_shared_faults(parts: Sequence[Part], lags: Lags) -> Iterator[Fault]:
@@ -174,16 +173,17 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     return np.asarray(y + gap * relative_lead)
 
 
-def _make_cross_axis_fault(channel: _Channels, other_channel: int, share_name: str) -> Fault:
-    """Make cross-axis sensitivity to another channel; share_name: name of its share in the catalogue."""
+def _make_cross_axis_fault(channel: _Channels, source: int, share: str, other_share: str) -> Fault:
+    """Make cross-axis sensitivity to channel `source`: its share in the catalogue; the other share is 0."""
     (channel_index,) = channel.indices
 
     def undo(part: Part) -> Part:
         response = part.response.copy()
-        response[:, channel_index] -= part.response[:, other_channel]
+        response[:, channel_index] -= part.response[:, source]
         return replace(part, response=response)
 
-    return channel.make_fault("cross_axis_sensitivity", [Variant((undo,), scale_parameter(share_name))])
+    variant = Variant((undo,), lambda sizes: {share: float(sizes[0]), other_share: 0.0})
+    return channel.make_fault("cross_axis_sensitivity", [variant])
 
 
 def _make_gain(channel: _Channels, gain: float) -> Variant:

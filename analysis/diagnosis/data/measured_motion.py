@@ -16,7 +16,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem, determine_unit_system
 
-_FORCE_QUANTITIES = frozenset({"force", "torque"})
+FORCE_QUANTITIES = frozenset({"force", "torque"})
 """Quantities that count as forces: a recording with such a response was driven by an imposed motion."""
 
 FREE_MOTION = "free"
@@ -119,7 +119,7 @@ def convert_to_force_driven(recording: Recording) -> Recording:
     motion the response, an excitation is removed, and `imposed` is set in its meta. Recordings with fewer commands than
     responses, and all others, are returned unchanged."""
     is_motion_command = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
-    is_force_response = set(recording.response.quantities) <= _FORCE_QUANTITIES
+    is_force_response = set(recording.response.quantities) <= FORCE_QUANTITIES
     if not (
         is_motion_command and is_force_response and len(recording.command.channels) >= len(recording.response.channels)
     ):

@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import build_regression
-from analysis.diagnosis.data.measured_motion import is_driven
+from analysis.diagnosis.data.measured_motion import FORCE_QUANTITIES, is_driven
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.limits import DERIVATIVE_GAIN
 from analysis.wording import conjoin
@@ -24,8 +24,6 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.signals.units import NO_UNIT
 
-FORCE_QUANTITIES = frozenset({"force", "torque"})
-"""Quantities of a measured force."""
 BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | FORCE_QUANTITIES) - {"voltage"}
 """Quantities that a force balance can use. A voltage is a sensor's reading of an unknown quantity."""
 

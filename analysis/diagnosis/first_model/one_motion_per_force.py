@@ -13,9 +13,10 @@ import numpy as np
 from analysis.diagnosis.balance.laws.friction_laws import LEAST_WIDTH_SHARE
 from analysis.diagnosis.balance.laws.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
+from analysis.diagnosis.data.measured_motion import FORCE_QUANTITIES
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.free_motion import convert_free_motion
-from analysis.diagnosis.first_model.infer_quantity import FORCE_QUANTITIES, infer_quantities
+from analysis.diagnosis.first_model.infer_quantity import infer_quantities
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
 from analysis.diagnosis.limits import SINGULAR_VALUE_RATIO

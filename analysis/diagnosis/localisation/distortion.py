@@ -41,7 +41,7 @@ from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, fi
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import select_instrument_signal
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import Signal
+from equalizer.signals.signal import FloatArray, Signal
 
 Kind = Literal["odd", "even", "either", "varying"]
 """Odd and even distortion; distortion of either kind where even lines were driven; variation between periods beyond the
@@ -49,13 +49,14 @@ noise."""
 
 
 class _Cell(NamedTuple):
-    """Output, input, level and band of a value of distortion: the first five fields of a `Distortion`."""
+    """Output, input, level, band and noise of a value of distortion: the first six fields of a `Distortion`."""
 
     output: str
     quantity: str
     input: str
     amplitude: float
     band_hz: Band
+    noise_rms: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,8 @@ class Distortion:
     """Level of the segment's excitation, in the command's unit."""
     band_hz: Band
     """Lower and upper end, Hz."""
+    noise_rms: float
+    """Rms noise of the channel in the same recording, over all frequencies; NaN where unknown."""
     whole_band: bool
     """True: all octaves of the driven band; False: one of them."""
     kind: Kind
@@ -119,7 +122,7 @@ def find_distortions(recordings: Sequence[Recording], floors: Sequence[NoiseFloo
             signals.append((recording.position, floor.position))
         for signal, noise in signals:
             for spectrum in compute_segment_spectra(recording, signal, noise, floor.frequency_hz, recording_periods):
-                cells += _compute_cells(spectrum, signal)
+                cells += _compute_cells(spectrum, signal, noise.rms)
     if not evaluated_periods:
         return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be distinguished.",))
     return Distortions(tuple(cells), tuple(_list_untestable_remarks(evaluated_periods)))
@@ -160,8 +163,8 @@ def _list_untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) 
     return remarks
 
 
-def _compute_cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
-    """Compute the distortions of all channels and bands of one segment."""
+def _compute_cells(spectrum: SegmentSpectrum, signal: Signal, noise_rms: FloatArray) -> list[Distortion]:
+    """Compute the distortions of all channels and bands of one segment. noise_rms: (channels,)."""
     lowest_hz, highest_hz = (float(line) for line in spectrum.frequency_hz[spectrum.lines.driven][[0, -1]])
     cells = []
     octaves = list_octaves(lowest_hz, highest_hz)
@@ -169,7 +172,9 @@ def _compute_cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion
         in_band = select_lines_in_band(spectrum.frequency_hz, band)
         if (in_band & spectrum.lines.driven).any():
             for index, name in enumerate(signal.channels):
-                cell = _Cell(name, signal.quantities[index], spectrum.input, spectrum.amplitude, band)
+                cell = _Cell(
+                    name, signal.quantities[index], spectrum.input, spectrum.amplitude, band, float(noise_rms[index])
+                )
                 cells += _compute_distortions(spectrum, index, in_band, cell, band == (octaves[0][0], octaves[-1][1]))
     return cells
 

@@ -39,7 +39,7 @@ def list_mismatch_rows(
     little meaning by itself."""
     significant_states = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
     significant_cells = _merge_parts([cell for cell in cells if cell.significant])
-    channel_rms = _compute_channel_rms(cells)
+    channel_rms = _compute_channel_rms(_merge_parts(cells))
     significant_states.sort(key=lambda state: (-state.region.share, state.region.p_value))
     significant_cells.sort(key=lambda cell: (-cell.rms / channel_rms[_identify_channel(cell)], cell.adjusted_p_value))
     return (*map(_make_state_row, significant_states), *map(_make_cell_row, significant_cells))[:limit]

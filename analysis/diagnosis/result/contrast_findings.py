@@ -164,13 +164,9 @@ def _find_axis_letter(judged_fault: JudgedFault, recording: Recording) -> str | 
 
 def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
     """Make the parameters of the fault with units and 95 % intervals; without an interval where the standard error is
-    0. A required parameter that the fault leaves out is 0: the other share of cross-axis sensitivity, whose shares are
-    compared one at a time."""
+    0."""
     units = _find_units(judged_fault.fault, recording, system)
-    entry = EFFECTS_BY_NAME.get(judged_fault.fault.effect)
-    required = () if entry is None else tuple(known.name for known in entry.parameters if not known.optional)
-    missing = {name: Estimate(0.0, units[name]) for name in required if name not in judged_fault.values}
-    return missing | {
+    return {
         name: Estimate(
             value,
             units.get(name, "1"),

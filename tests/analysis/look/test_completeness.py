@@ -41,6 +41,9 @@ def test_a_constant_response_is_wrong_and_a_constant_command_is_reported(make_re
 def test_the_zero_command_of_a_free_motion_is_to_be_kept(make_recording, draw_noise):
     (check,) = check_constant_channels(list_channels(make_recording(np.zeros(N), draw_noise(1))))
     assert check.advice.startswith("In a free motion, such as a decay, keep it")
+    commands = np.column_stack([np.zeros(N), np.full(N, np.nan)])  # a command that was never read drives nothing
+    (check,) = check_constant_channels(list_channels(make_recording(commands, draw_noise(1))))
+    assert check.advice.startswith("In a free motion, such as a decay, keep it")
 
 
 @pytest.mark.parametrize(

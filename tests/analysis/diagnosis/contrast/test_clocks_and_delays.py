@@ -281,9 +281,13 @@ def test_the_shares_of_three_axes_are_those_of_the_catalogue():
     samples = np.tile(recording.response.samples, (1, 3))
     three = replace(recording.response, samples=samples, channels=("x", "y", "z"))
     parts = split_into_parts([replace(recording, response=three)])
-    names = [
-        [*fault.variants[0].parameters_of(np.array([0.1]))]
+    shares = [
+        [*fault.variants[0].parameters_of(np.array([0.1])).items()]
         for fault in make_sensor_faults(2, "z", parts, Lags(1, (), 0.0, ()))
         if fault.effect == "cross_axis_sensitivity"
     ]
-    assert names == [["from_next"], ["from_after_next"]]
+    # The catalogue requires both shares; the one that is compared is the main number, the first.
+    assert shares == [
+        [("from_next", 0.1), ("from_after_next", 0.0)],
+        [("from_after_next", 0.1), ("from_next", 0.0)],
+    ]

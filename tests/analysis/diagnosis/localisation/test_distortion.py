@@ -165,6 +165,9 @@ def test_levels_in_recordings_of_their_own_are_compared_in_any_order(device):
     )
     assert {cell.amplitude for cell in found.cells} == {1.0, 2.0, 4.0}
     assert set(found.cells) == set(reversed_found.cells)
+    # Each cell has the noise of its own recording.
+    noise_rms = [float(estimate_noise_floor(recording).response_rms[0]) for recording in parts]
+    assert {cell.noise_rms for cell in found.cells if cell.output == "ax"} == set(noise_rms)
     assert found.remarks == reversed_found.remarks
     assert not any("one level only" in remark for remark in found.remarks)
     trends = whole_band_trends(compute_level_trends(found.cells), "ax", "fx")

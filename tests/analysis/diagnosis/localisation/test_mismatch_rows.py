@@ -61,3 +61,11 @@ def test_parts_with_the_same_mismatch_are_one_row():
     (row,) = list_mismatch_rows(parts)
     assert row.share == pytest.approx((0.5 * (0.3**2 + 0.4**2)) ** 0.5)
     assert len(list_mismatch_rows([*parts, make_cell(0.3, amplitude=2.0)])) == 2
+
+
+def test_a_level_that_was_recorded_again_does_not_change_the_order_of_rows():
+    """Rows are ordered by the mismatch over the channel's signal, which repeats do not enlarge."""
+    other_channel = replace(make_cell(0.35), output="ay")
+    once = list_mismatch_rows([make_cell(0.4), other_channel])
+    again = list_mismatch_rows([*(replace(make_cell(0.4), part=part) for part in range(4)), other_channel])
+    assert [row.output for row in once] == [row.output for row in again] == ["ax", "ay"]

@@ -8,7 +8,6 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.document import Estimate
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.localisation.model_error_floor import (
     IncomparableRecordingsError,
@@ -19,11 +18,10 @@ from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
     require_same_measure,
 )
-from analysis.diagnosis.result.contrast_findings import _make_estimates, simulate_named_fault
+from analysis.diagnosis.result.contrast_findings import simulate_named_fault
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
 from equalizer.plant.mechanical_model import ModelEffect, Tolerance
-from equalizer.signals.unit_system import LINEAR
 
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
 AMONG = ("coulomb_friction", "viscous_damping", "amplifier_lag", "force_gain")
@@ -89,14 +87,6 @@ def test_a_fault_that_cannot_be_simulated_keeps_the_errors_of_the_comparison(dia
     findings = SimpleNamespace(given=given, improved=improved, explanation=SimpleNamespace(before=None))
     context = SimpleNamespace(full_measure=SimpleNamespace(residuals=None))
     assert simulate_named_fault(findings, context, diagnosed.recorded(1, (), seed=11)) is findings
-
-
-def test_a_share_that_the_comparison_leaves_out_is_zero():
-    fault = SimpleNamespace(effect="cross_axis_sensitivity", place="sensor", site=0)
-    judged = SimpleNamespace(fault=fault, values={"from_after_next": 0.1}, standard_errors={"from_after_next": 0.0})
-    recording = SimpleNamespace(response=SimpleNamespace(units=("m/s^2",) * 3))
-    estimates = _make_estimates(judged, recording, LINEAR)
-    assert estimates == {"from_next": Estimate(0.0, "1"), "from_after_next": Estimate(0.1, "1")}
 
 
 @pytest.mark.slow
