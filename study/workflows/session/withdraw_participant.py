@@ -7,7 +7,6 @@ command continues an interrupted withdrawal.
 """
 
 import errno
-import glob
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
@@ -29,7 +28,7 @@ from study.store.sessions.session_lock import SESSION_LOCK_NAME, hold_session_lo
 from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
 from study.store.sessions.written_elsewhere import read_written_folders
 from study.workflows.session.participant_number import read_begun_participant
-from study.workflows.session.participant_traces import find_traces, is_subject_in_analysis
+from study.workflows.session.participant_traces import UNFINISHED_PATTERN, find_traces, is_subject_in_analysis
 
 COPIES_REMINDER = "Analyses written elsewhere with --out, and copies, still hold the numbers: erase them."
 """Reminder of copies that the program cannot find, for messages."""
@@ -148,9 +147,11 @@ def _find_copies(data: Path) -> tuple[Path, ...]:
 def _list_unfinished(folder: Path) -> list[Path]:
     """List the unfinished folders beside this one, which an interrupted export to it left (`create_new_folder`)."""
     try:
-        return sorted(folder.parent.glob(f".{glob.escape(folder.name)}.*.part"))
+        entries = sorted(folder.parent.iterdir())
     except OSError:  # their folder cannot be seen: `folder` is named all the same
         return []
+    unfinished = ((entry, UNFINISHED_PATTERN.fullmatch(entry.name)) for entry in entries)
+    return [entry for entry, name_match in unfinished if name_match and name_match["name"] == folder.name]
 
 
 def _is_gone(path: Path) -> bool:

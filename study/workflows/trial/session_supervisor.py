@@ -120,13 +120,17 @@ class SessionSupervisor:
         return reply
 
     def add_note(self, note: NoteAsked) -> None:
-        """Store a note until `take_notes`; nothing is written yet."""
+        """Store a note until `drop_note`; nothing is written yet."""
         self._notes.append(note)
 
-    def take_notes(self) -> tuple[NoteAsked, ...]:
-        """Return the notes since the last call, oldest first, and forget them."""
-        notes, self._notes = tuple(self._notes), []
-        return notes
+    @property
+    def next_note(self) -> NoteAsked | None:
+        """The oldest note that is not logged; None without one."""
+        return self._notes[0] if self._notes else None
+
+    def drop_note(self) -> None:
+        """Forget the oldest note, because it is logged."""
+        del self._notes[0]
 
     def set_handle_ready(self, ready: bool) -> None:
         """Set whether the handle is at its start position, for viewers; True again after the next `start_activity`."""

@@ -113,13 +113,14 @@ def notify_experimenter(sentence: str, sitting: Sitting) -> None:
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
-    """Take pending requests, then log all notes since the last call. Raises as `log_and_apply`; the notes of other
-    programs that are not logged then are kept for the next sitting."""
+    """Take pending requests, then log all notes that are not logged yet. Raises as `log_and_apply`; the notes that are
+    not logged then are kept for the next call, those of other programs also for the next sitting."""
     sitting.supervisor.listen()
     inbox = RequestInbox(sitting.folder.path)
-    for note in sitting.supervisor.take_notes():
+    while (note := sitting.supervisor.next_note) is not None:
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
         state = log_and_apply(state, event, sitting)
+        sitting.supervisor.drop_note()
         inbox.forget_logged(note)
     return state
 

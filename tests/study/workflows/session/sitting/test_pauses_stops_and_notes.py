@@ -193,11 +193,14 @@ def test_a_note_is_in_the_log_however_the_sitting_ends(plan, small_protocol, sea
     assert "pain in a finger" in SessionFolder(tmp_path / "data" / "P01_001").log.read_text()
 
 
-def test_notes_come_once_each_where_the_disk_was_full_for_a_moment(plan, small_protocol, seat, person, monkeypatch):
+@pytest.mark.parametrize("lost", ["typed on the screen", "second"])
+def test_notes_come_once_each_where_the_disk_was_full_for_a_moment(
+    plan, small_protocol, seat, person, monkeypatch, lost
+):
     append, folder = EventLog.append, SessionFolder(plan(small_protocol).data_folder / "P01_001")
 
     def fill_disk(log, event):
-        if isinstance(event, NoteTaken) and event.text == "second":
+        if isinstance(event, NoteTaken) and event.text == lost:
             monkeypatch.setattr(EventLog, "append", append)
             RequestInbox(folder.path).send(NoteAsked("experimenter", "fourth"))
             raise StudyError("The session cannot be written to disk", "The disk is full.", "Make room.")
@@ -206,6 +209,7 @@ def test_notes_come_once_each_where_the_disk_was_full_for_a_moment(plan, small_p
     def note(question):
         for text in ("first", "second", "third"):
             RequestInbox(folder.path).send(NoteAsked("experimenter", text))
+        seat.requests.send(NoteAsked("participant", "typed on the screen"))
         monkeypatch.setattr(EventLog, "append", fill_disk)
 
     person.at_question = note
@@ -213,7 +217,8 @@ def test_notes_come_once_each_where_the_disk_was_full_for_a_moment(plan, small_p
         conduct_new(plan(small_protocol), "simulated", seat)
     again = Person(seat.clock)
     resumed = conduct_resumed(folder, "simulated", Participant(display=again, hand=again, clock=seat.clock))
-    assert [note.text for note in of(resumed, NoteTaken)] == ["first", "fourth", "second", "third"]
+    notes = [note.text for note in of(resumed, NoteTaken)]
+    assert notes == ["typed on the screen", "first", "second", "third", "fourth"]
     assert list((folder.path / "requests").iterdir()) == []
 
 
