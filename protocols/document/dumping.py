@@ -51,9 +51,14 @@ def _format_value(value: Any) -> str:
         case bool():
             return str(value).lower()
         case str():
-            # TOML's basic strings are JSON's, except that TOML forbids a bare delete character and escaped surrogates.
-            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+            return format_toml_text(value)
         case list():
             return f"[{', '.join(_format_value(entry) for entry in value)}]"
         case _:
             return repr(value)
+
+
+def format_toml_text(text: str) -> str:
+    """Format a text as TOML: its basic strings are JSON's, except that TOML forbids a bare delete character and escaped
+    surrogates."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

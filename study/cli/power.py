@@ -180,11 +180,12 @@ def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str
     comparison_text = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
     roving_lines = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
     medians_n = dict(zip(plan.crowd.frequencies_hz, plan.crowd.medians_n, strict=True))
-    above_cap_lines = [
+    above_cap_text = (
         f"Both medians lie above the cap of {plan.rule.cap_n:g} N. Where the model puts both more than "
         f"{FAR_ABOVE_DB:g} dB above it, a report gives neither the difference nor its interval: this counts as not "
         "found and not covered."
-    ] * (min(medians_n[first_hz], medians_n[second_hz]) > plan.rule.cap_n)
+    )
+    above_cap_lines = [above_cap_text] if min(medians_n[first_hz], medians_n[second_hz]) > plan.rule.cap_n else []
     power_lines = format_power_lines(points, select_threshold_words(plan.rule).noun)
     return [*power_lines, "", comparison_text, *roving_lines, *above_cap_lines]
 

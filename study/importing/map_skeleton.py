@@ -10,13 +10,13 @@ from dataclasses import replace
 from itertools import takewhile
 from textwrap import wrap
 
+from protocols.document.dumping import format_toml_text
 from study.importing.arrays.array_groups import RunGroups, find_runs
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import CELL_ENTRY_PREFIX, suggest_conversion
 from study.importing.arrays.read_arrays import Array, Arrays, find_unread_reason
 from study.importing.expressions.expression import quote_name
 from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
-from study.importing.map_format.map_toml import format_text
 from study.importing.map_format.signal_words import (
     may_be_imposed_motion,
     parse_signal_name,
@@ -215,7 +215,7 @@ def _write_parts(prefixes: tuple[str, ...]) -> Iterator[str]:
         yield "\n# Several runs are in the file: their arrays are named without the prefix above."
     for prefix in prefixes:
         yield "\n[[part]]"
-        yield f"prefix = {format_text(prefix)}"
+        yield f"prefix = {format_toml_text(prefix)}"
 
 
 def _write_ungrouped_runs(ungrouped_names: Sequence[str], run_groups: RunGroups) -> Iterator[str]:
@@ -231,7 +231,7 @@ def _write_ungrouped_runs(ungrouped_names: Sequence[str], run_groups: RunGroups)
     for prefix, slash, name in (full_name.partition("/") for full_name in ungrouped_names):
         if (stem := _ROLE_SUFFIX.sub("", name)) in name_by_stem:
             definitions_by_run.setdefault(prefix + slash, []).append(
-                f"{name_by_stem[stem]} = {format_text(quote_name(name))}"
+                f"{name_by_stem[stem]} = {format_toml_text(quote_name(name))}"
             )
     for prefix, definitions in list(definitions_by_run.items())[-1:]:
         yield f'# Such a run is added by [[part]] with prefix = "{prefix}" and let = {{ {", ".join(definitions)} }}'
@@ -248,16 +248,17 @@ def _write_clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
         suffix = stem.rpartition("_")[2]
         yield "\n[[clock]]"
         if len(clocks) > 1:
-            yield f"name = {format_text(name)}"
-        yield f"time = {format_text(name)}"
-        yield f'time_unit = {format_text(unit or (suffix if suffix in _TIME_UNITS else ""))}            # "s", "ms"'
+            yield f"name = {format_toml_text(name)}"
+        yield f"time = {format_toml_text(name)}"
+        unit_text = format_toml_text(unit or (suffix if suffix in _TIME_UNITS else ""))
+        yield f'time_unit = {unit_text}            # "s", "ms"'
     if clocks:
         return
     yield "\n[[clock]]"
     rates = find_rates(arrays)
     for rate, name in list(rates.items())[:1]:
         remark = f", {name} in seconds" if rate.startswith("1 / ") else ""
-        yield f"rate = {format_text(rate)}           # in hertz{remark}"
+        yield f"rate = {format_toml_text(rate)}           # in hertz{remark}"
     if not rates:
         yield "# rate_hz = 1000, or unknown = true"
 
@@ -283,13 +284,14 @@ def _write_channel(names: tuple[str, str, str], shape: str, clock: str, role: st
     parsed_name = parse_signal_name(header)
     yield ""
     yield f"[[channel]]               # {header}: {shape}"
-    yield f"role = {format_text(role):20s} # command, response, position, excitation, condition, helper"
-    yield f"name = {format_text(parsed_name.name if name == header else name)}"
-    yield f"value = {format_text(value)}"
+    yield f"role = {format_toml_text(role):20s} # command, response, position, excitation, condition, helper"
+    yield f"name = {format_toml_text(parsed_name.name if name == header else name)}"
+    yield f"value = {format_toml_text(value)}"
     unit, doubt = parsed_name.unit, f"{parsed_name.doubt}; " if parsed_name.doubt else ""
-    yield f'unit = {format_text(unit):20s} # {doubt}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
+    unit_text = format_toml_text(unit)
+    yield f'unit = {unit_text:20s} # {doubt}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
-        yield f"clock = {format_text(clock)}"
+        yield f"clock = {format_toml_text(clock)}"
 
 
 def _describe_shape(shape: tuple[int, ...]) -> str:

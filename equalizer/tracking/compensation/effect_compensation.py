@@ -87,13 +87,12 @@ def compensate(
     if identified_with_n is not None and not identified_with_n > 0:
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz
-    motion = convert_motion_to_axes(
-        integrate_motion(reference, rate_hz, model.band_hz, compute_lead_s(physics, rate_hz)), physics
-    )
+    to_axes = compute_channels_to_axes(physics, reference.shape[1])
+    integrated_motion = integrate_motion(reference, rate_hz, model.band_hz, compute_lead_s(physics, rate_hz))
+    motion = convert_motion_to_axes(integrated_motion, to_axes)
     effect_reasons = [(effect, explain_not_compensated(effect, model.input_channels)) for effect in physics.effects]
     compensated_effects = tuple(effect for effect, reason in effect_reasons if not reason)
     axis_gains = compute_axis_gains(physics, model.input_channels, model.output_channels)
-    to_axes = compute_channels_to_axes(physics, reference.shape[1])
     scaled_forces, compensating_forces = forces.copy(), np.zeros_like(forces)
     for effect, axis in _iterate_effects_by_axis(compensated_effects, model):
         if effect.kind in LAWS or _is_force_law(effect):
@@ -111,9 +110,9 @@ def compensate(
     return Compensation(forces + scale * added_forces, compensated_effects, not_used, scale)
 
 
-def convert_motion_to_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
-    """Convert a motion along the response channels to one along the driven axes, on which the effects act."""
-    to_axes = compute_channels_to_axes(physics, motion.position.shape[1])
+def convert_motion_to_axes(motion: PlannedMotion, to_axes: FloatArray) -> PlannedMotion:
+    """Convert a motion along the response channels to one along the driven axes, on which the effects act. to_axes: by
+    `compute_channels_to_axes`."""
     return PlannedMotion(motion.position @ to_axes, motion.velocity @ to_axes, motion.acceleration @ to_axes)
 
 

@@ -18,6 +18,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.tracking.compensation.effect_compensation import (
     compute_axis_gains,
+    compute_channels_to_axes,
     compute_slip_speed,
     convert_motion_to_axes,
     evaluate_force_law,
@@ -63,7 +64,7 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
     # Without the offset of the sensor, such as gravity: the record must begin and end at zero.
     acceleration = recording.response.samples - recording.response.samples.mean(axis=0)
     integrated_motion = integrate_motion(acceleration, rate_hz, band_hz, compute_lead_s(physics, rate_hz))
-    motion = convert_motion_to_axes(integrated_motion, physics)
+    motion = convert_motion_to_axes(integrated_motion, compute_channels_to_axes(physics, len(outputs)))
     axis_gains, commands = compute_axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:
         for axis in find_effect_axes(effect, inputs, outputs):

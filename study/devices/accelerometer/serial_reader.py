@@ -65,7 +65,7 @@ def open_serial(path: str, baud: int) -> SerialSource:
         ) from error
     try:
         return SerialSource(_SerialPort(serial.Serial(path, baud, timeout=READ_TIMEOUT_S, exclusive=True)))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, OverflowError) as error:  # OverflowError: of a rate that no system has
         raise DeviceError(
             "The accelerometer cannot be opened",
             f"{path}: {error}.",

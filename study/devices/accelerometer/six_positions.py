@@ -4,13 +4,13 @@ The calibration itself (least squares under gravity) is in `calibration`; the re
 the laboratory's settings file.
 """
 
-import json
 import time
 from collections.abc import Callable
 
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from protocols.document.dumping import format_toml_text
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, Calibration, calibrate
 from study.devices.accelerometer.samples import SampleSource
 from study.devices.accelerometer.sensor import make_silence_error
@@ -70,7 +70,7 @@ def format_calibration_toml(calibration: Calibration, path: str, baud: int) -> s
             "[accelerometer]",
             f"# Noise {noise} m/s2, cross-axis {calibration.cross_axis:.1%}, positions fit to "
             f"{calibration.residual_g:.3f} g.",
-            f"port = {json.dumps(path, ensure_ascii=False)}",  # a JSON string is one of TOML, too
+            f"port = {format_toml_text(path)}",
             f"baud = {baud}",
             f"bias = {_format_toml_numbers(calibration.bias)}",
             f"sensitivity = [{sensitivity_rows}]",

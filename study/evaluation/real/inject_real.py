@@ -179,29 +179,17 @@ def run_injections(
     count, seed = count_and_seed
     folder = open_proof_folder(path, seed, False)
     with hold_proof_folder(folder):
-        return _run_held_injections(folder, injectable_recordings, (count, seed), on_done, workers)
-
-
-def _run_held_injections(
-    folder: ProofFolder,
-    injectable_recordings: Sequence[InjectableRecording],
-    count_and_seed: tuple[int, int],
-    on_done: Callable[[int, int], None],
-    workers: Workers,
-) -> tuple[InjectedOutcome, ...]:
-    """Do the work of `run_injections` in a folder whose lock is held."""
-    count, seed = count_and_seed
-    case_names = seal_injections(folder, injectable_recordings, count, seed)
-    answered_count = sum(is_answered(folder.open / name) for name in case_names)
-    on_done(answered_count, count)
-
-    def count_answer(name: str) -> None:
-        """Report one more diagnosed case."""
-        nonlocal answered_count
-        answered_count += 1
+        case_names = seal_injections(folder, injectable_recordings, count, seed)
+        answered_count = sum(is_answered(folder.open / name) for name in case_names)
         on_done(answered_count, count)
 
-    diagnose_cases(folder, case_names, workers, count_answer)
+        def count_answer(name: str) -> None:
+            """Report one more diagnosed case."""
+            nonlocal answered_count
+            answered_count += 1
+            on_done(answered_count, count)
+
+        diagnose_cases(folder, case_names, workers, count_answer)
     labels = [read_label(folder.get_label_file(number)) for number in range(len(case_names))]
     answers = [read_answer(folder.open / name) for name in case_names]
     if broken_names := [

@@ -55,9 +55,10 @@ class Namespace:
         if (name := self._resolve_name(expression)) in self.arrays:
             return self._convert_to_float(name)
         stem, unit = split_bracketed_unit(expression)
-        index_name = self._resolve_name(expression.strip().removeprefix(stem).strip("[]() "))  # `unit` as it is written
-        if unit != "1" and is_unit(unit) and stem not in FUNCTIONS and not self.has_name(index_name):
-            raise self._make_unknown_error(expression)  # a name with its unit, not an index or an argument
+        if unit != "1" and is_unit(unit) and stem not in FUNCTIONS:
+            index_name = self._resolve_name(expression.strip().removeprefix(stem).strip("[]() "))  # as it is written
+            if not self.has_name(index_name):
+                raise self._make_unknown_error(expression)  # a name with its unit, not an index or an argument
         return evaluate(expression, lambda name: self.look_up_value(name, clock), clock, self.budget)
 
     def compute_number(self, expression: str) -> float:

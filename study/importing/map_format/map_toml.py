@@ -52,11 +52,6 @@ def is_map(values: dict[str, Any]) -> bool:
     return isinstance(values.get("channel"), list)
 
 
-def format_text(text: str) -> str:
-    """Write a text in quotes. TOML's are those of JSON, but without escaped surrogates and a bare delete character."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
 def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
     """Describe each validation error of pydantic (`ValidationError.errors()`) in a clause."""
     for error in errors:

@@ -9,6 +9,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from protocols.definition.apparatus import SafetySettings
+from protocols.definition.new_use import NOMINAL_RATE_HZ
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceInfo, Look
 from study.session.stimulus.limits import describe_forces
@@ -30,9 +31,6 @@ MAX_DISTANCE_MM = 20.0
 MAX_NOISE_MPS2 = 1.0
 """Largest accepted acceleration at rest (m/s², root of the summed variances of the three axes). Chosen above the
 typical noise of an accelerometer over 500 Hz, about 0.1 m/s², and the tremor of a hand on the handle, up to 0.5."""
-
-REQUIRED_RATE_HZ = 1000.0
-"""Sample rate of the device's loop for which stimuli are made (Hz)."""
 
 MM_PER_M = 1000.0
 
@@ -156,9 +154,9 @@ def _report_accelerometer_problem(problem_text: str, advice: str) -> DeviceFindi
 
 
 def _check_rate(info: DeviceInfo) -> DeviceFinding:
-    """Judge the sample rate; fine within 1 % of `REQUIRED_RATE_HZ`, inclusive."""
-    fine = abs(info.sample_rate_hz - REQUIRED_RATE_HZ) <= 0.01 * REQUIRED_RATE_HZ
-    advice = f"Stimuli are made for {REQUIRED_RATE_HZ:g} Hz: set the device's loop to that."
+    """Judge the sample rate; fine within 1 % of `NOMINAL_RATE_HZ`, inclusive."""
+    fine = abs(info.sample_rate_hz - NOMINAL_RATE_HZ) <= 0.01 * NOMINAL_RATE_HZ
+    advice = f"Stimuli are made for {NOMINAL_RATE_HZ:g} Hz: set the device's loop to that."
     return DeviceFinding("Rate", f"{info.sample_rate_hz:g} Hz", fine, "" if fine else advice)
 
 

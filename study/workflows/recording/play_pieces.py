@@ -5,14 +5,14 @@ reached its limit, and the protocol allows it (`lower_on_clip`), the piece is pl
 last take is kept.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
 from study.devices.device import Device, Fault, Health
 from study.errors import DeviceError
-from study.session.stimulus.recording_pieces import RecordingPiece, make_pieces
+from study.session.stimulus.recording_pieces import RecordingPiece
 
 AMPLITUDE_REDUCTION = 0.7
 """Factor of the amplitude from a take to the next (-3 dB): 0.17 after five reductions. Chosen."""
@@ -53,17 +53,22 @@ def is_clipped(health: Health) -> bool:
 
 
 def play_pieces(
-    protocol: RecordingProtocol, device: Device, kept_takes: list[RecordedTake], on_progress: Callable[[float], None]
+    protocol: RecordingProtocol,
+    pieces: Sequence[RecordingPiece],
+    device: Device,
+    kept_takes: list[RecordedTake],
+    on_progress: Callable[[float], None],
 ) -> None:
     """Play the whole protocol, and append the kept take of each piece to `kept_takes`. A lowered amplitude is also used
     for later repetitions of the same segment and frequency.
 
-    on_progress: called with the seconds played, repeated takes not counted; decreases where a piece is repeated. Raises
-    DeviceError where the device stopped; `kept_takes` then contains the pieces before.
+    pieces: of the protocol, at the device's rate (`make_pieces`). on_progress: called with the seconds played, repeated
+    takes not counted; decreases where a piece is repeated. Raises DeviceError where the device stopped; `kept_takes`
+    then contains the pieces before.
     """
     total_s = 0.0
     amplitude_shares: dict[tuple[int, float | None], float] = {}
-    for piece in make_pieces(protocol, device.info.sample_rate_hz):
+    for piece in pieces:
         piece_s, started_s = piece.commands.duration_s, total_s
         segment_key = (piece.number, piece.frequency_hz)
         take = _repeat_until_unclipped(

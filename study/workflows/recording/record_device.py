@@ -5,12 +5,13 @@ fails, the pieces that are complete are written.
 """
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from equalizer.signals.joining import join_recordings
+from protocols.definition.new_use import NOMINAL_RATE_HZ
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.hashing import hash_protocol
 from study.devices.clock import RealClock, VirtualClock
@@ -18,7 +19,7 @@ from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, UserInterruptError
 from study.session.stimulus.limits import make_recording_limits
-from study.session.stimulus.recording_pieces import make_pieces
+from study.session.stimulus.recording_pieces import RecordingPiece, make_pieces
 from study.session.views.handle_notice import BeforeMoving, format_recording_notice, refuse_unannounced
 from study.store.disk.atomic_write import reserve_space
 from study.store.disk.file_errors import CannotWriteError
@@ -28,9 +29,6 @@ from study.workflows.ignored_interrupts import ignore_interrupts
 from study.workflows.output_paths import require_new_outputs
 from study.workflows.recording.play_pieces import RecordedTake, play_pieces
 from study.workflows.recording.recording_metadata import describe_segment, describe_spring, list_warnings
-
-NOMINAL_RATE_HZ = 1000.0
-"""Sample rate (Hz) with which durations are computed before a device is open."""
 
 BYTES_PER_SAMPLE, BYTES_PER_PIECE, BYTES_PER_FILE = 100, 4096, 2**17
 """Upper bounds of what a sample, a piece and the rest take in the file: four signals of three channels, of 8 bytes and
@@ -94,11 +92,12 @@ def record_on_device(
     """Record on an open device, whose settings are those of `make_recording_settings`. Arguments and errors are as for
     `record_device`, but `require_new_output` is left to the caller."""
     takes: list[RecordedTake] = []
+    pieces = make_pieces(plan.protocol, device.info.sample_rate_hz)
     try:
-        with _reserve_space(plan, device.info.sample_rate_hz):
+        with _reserve_space(plan, pieces):
             if not device.info.simulated:
                 before_moving(format_recording_notice(plan.protocol, device.info.name, plan.total_s))
-            play_pieces(plan.protocol, device, takes, on_progress)
+            play_pieces(plan.protocol, pieces, device, takes, on_progress)
     except KeyboardInterrupt as interruption:
         _write_complete_takes(plan, device, takes)
         if device.fault() is Fault.FORCE_LEFT:  # more important to say than the interruption
@@ -112,18 +111,18 @@ def record_on_device(
 
 
 @contextlib.contextmanager
-def _reserve_space(plan: RecordingPlan, sample_rate_hz: float) -> Iterator[None]:
+def _reserve_space(plan: RecordingPlan, pieces: Sequence[RecordingPiece]) -> Iterator[None]:
     """Context that keeps free space for the file, which is written at the end. Raises CannotWriteError before the body
     where there is none."""
-    pieces = make_pieces(plan.protocol, sample_rate_hz)
     sample_count = sum(len(piece.commands) for piece in pieces)
     size_bytes = BYTES_PER_SAMPLE * sample_count + BYTES_PER_PIECE * len(pieces) + BYTES_PER_FILE
-    try:
-        with reserve_space(plan.out, size_bytes):
-            yield
-    except CannotWriteError as error:
-        error.saved = "Nothing moved, and nothing was written."
-        raise
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(reserve_space(plan.out, size_bytes))
+        except CannotWriteError as error:
+            error.saved = "Nothing moved, and nothing was written."
+            raise
+        yield
 
 
 def require_new_output(out_path: Path) -> None:
