@@ -1,17 +1,17 @@
 """Whether this process stood still while a test ran against the clock.
 
-A thread asks to be woken every few milliseconds and keeps how late that was. The safety layer lets go of a device whose
-program gives no sign of life for 0.1 s: where a machine gives the test no processor for so long, the device is right to
-let go, and a test of something else fails for no fault of the code. Such a test is run again; a failure without a
-measured pause never is.
+A thread asks to be woken every few milliseconds and keeps how late that was. The firmware of a device lets go 30 ms after
+the last force, the safety layer 0.1 s after the last sign of life: where a machine gives the test no processor for so
+long, the device is right to let go, and a test of something else fails for no fault of the code. Such a test is run
+again; a failure without a measured pause never is.
 """
 
 import threading
 import time
 
 PERIOD_S = 0.002
-# After this the safety layer takes the program for dead (`study.devices.drive.realtime_drive.LATE_S`).
-TOO_LONG_S = 0.1
+# The shortest of these times: the timeout of the firmware's watchdog (`study.devices.force_dimension.connect`).
+TOO_LONG_S = 0.03
 
 
 class PauseMeter:

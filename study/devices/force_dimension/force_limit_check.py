@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from equalizer.signals.signal import Signal
-from study.devices.device import Device, DeviceInfo, Fault, PlaybackResult
+from study.devices.device import Device, DeviceInfo, Fault, Health, PlaybackResult
 from study.devices.force_dimension.watchdog_check import MARGIN_S
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -56,7 +56,7 @@ class CappedDevice(Protocol):
 
     def keep_alive(self) -> None: ...
 
-    def fault(self) -> Fault: ...
+    def health(self) -> Health: ...
 
     def release(self) -> PlaybackResult: ...
 
@@ -121,8 +121,7 @@ def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
     tick_capped_n = _measure_largest_n(device, rig)
     device.release()
     _check_reported_force("at each tick", tick_capped_n)
-    if device.fault() is not Fault.NONE:
-        raise _make_acceptance_error(f"The force did not last: {device.fault().value}.")
+    _require_lasting_force(device.health())
     library_capped_n = rig.read_reported_without_cap_n(COMMAND_TO_CAP_RATIO * TEST_FORCE_N)
     _check_reported_force("of the library", library_capped_n)
     return max(tick_capped_n, library_capped_n)
@@ -150,16 +149,25 @@ def _check_reported_force(cap_name: str, reported_n: float) -> None:
         raise _make_acceptance_error(f"The cap {cap_name} could not be tried: {result_text}.")
 
 
+def _require_lasting_force(health: Health) -> None:
+    """Raise `DeviceError` with the cause where a fault ended the test force."""
+    if health.fault is not Fault.NONE:
+        cause = f" ({health.why})" if health.why else ""
+        raise _make_acceptance_error(f"The force did not last: {health.fault.value}{cause}.")
+
+
 def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
     """Part 2: stop the commands while a force is held. Returns the time (s) after which the device reported its forces
     as off. device: opened without a spring; its loop counts as failed afterwards, so that it must be closed. Raises
     `DeviceError` where the force remained, or was too small or off before the commands stopped."""
     device.hold(_make_constant_force(device.info.sample_rate_hz))
     _keep_alive_for(device, HOLD_DURATION_S)
-    if device.fault() is not Fault.NONE or not rig.is_force_on():
-        raise _make_acceptance_error(f"The force did not last: {device.fault().value}.")
-    if device.health().peak_command_n < MIN_COMMANDED_SHARE * TEST_FORCE_N:
-        raise _make_acceptance_error(f"The force only reached {device.health().peak_command_n:.2f} N.")
+    health = device.health()
+    _require_lasting_force(health)
+    if not rig.is_force_on():
+        raise _make_acceptance_error("The force did not last: the device reports its forces as off.")
+    if health.peak_command_n < MIN_COMMANDED_SHARE * TEST_FORCE_N:
+        raise _make_acceptance_error(f"The force only reached {health.peak_command_n:.2f} N.")
     silent_since_s = rig.withhold(PAUSE_S)
     limit_s = rig.drops_force_after_s + MARGIN_S
     while rig.is_force_on():

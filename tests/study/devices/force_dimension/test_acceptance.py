@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+import time
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -117,6 +118,7 @@ def patient(stub, monkeypatch):
 
 
 @pytest.mark.real_time
+@pytest.mark.may_be_late
 def test_a_device_that_lets_go_under_force_is_accepted_and_then_opens(locked, patient, rigs):
     said = accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
     assert "a force of 0.5 N was gone" in said
@@ -162,6 +164,23 @@ def test_a_device_that_gets_more_than_its_cap_is_not_accepted(locked, patient, r
     assert said in no.value.happened
     assert not locate_acceptance_file().exists()
     assert locked.safe and locked.get("peak_n") <= 1.1
+
+
+@pytest.mark.real_time
+@pytest.mark.may_be_late
+def test_a_device_that_fails_during_the_test_is_not_accepted_and_the_cause_is_named(locked, patient, rigs, monkeypatch):
+    measure = force_limit_check._measure_largest_n
+
+    def measure_then_fail(device, rig) -> float:
+        largest_n = measure(device, rig)
+        locked.fail("dhdSetForce", 7)
+        time.sleep(0.05)
+        return largest_n
+
+    monkeypatch.setattr(force_limit_check, "_measure_largest_n", measure_then_fail)
+    with pytest.raises(DeviceError, match=r"The force did not last: .* \(The library says: dhdSetForce: timeout"):
+        accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
+    assert not locate_acceptance_file().exists()
 
 
 def test_what_admission_refuses_is_never_held_with_a_hand_on_the_handle(stub, rigs):
