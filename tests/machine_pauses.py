@@ -1,9 +1,9 @@
 """Whether this process stood still while a test ran against the clock.
 
-A thread asks to be woken every few milliseconds and keeps how late that was. The firmware of a device lets go 30 ms after
-the last force, the safety layer 0.1 s after the last sign of life: where a machine gives the test no processor for so
-long, the device is right to let go, and a test of something else fails for no fault of the code. Such a test is run
-again; a failure without a measured pause never is.
+A thread asks to be woken every few milliseconds and keeps how late that was. The firmware of a device lets go 30 ms
+after the last force, the safety layer 0.1 s after the last sign of life: where a machine gives the test no processor
+for so long, the device is right to let go, and a test of something else fails for no fault of the code. Such a test is
+run again; a failure without a measured pause never is.
 """
 
 import threading
