@@ -261,7 +261,7 @@ def _make_command_action(law: Law, channels: Channels) -> OnCommand:
     """Make the action of a law that replaces the command of its axis. Raises LawError for a signal that is
     neither a command nor the time."""
     letters = {COMMAND_PREFIX + letter: axis for axis, letter in enumerate(derive_axis_letters(channels.inputs))}
-    signals = {name: axis for axis, name in enumerate(channels.inputs)} | letters
+    signals = letters | {name: axis for axis, name in enumerate(channels.inputs) if name not in letters}
     # Compiled only to raise LawError now, not in the first simulation: the columns, such as -1 of t, are not read.
     compile_program(law.tree, {**signals, "t": -1})
 
