@@ -2,7 +2,8 @@
 
 A diagnosis can also name laws that are not listed here; a simulation includes them as formulas, if at all
 (`analysis.diagnosis.effect_words`). Each effect module that is imported here defines one `EFFECT`. A new effect needs
-its own module, an entry here and its name in `equalizer.plant.effect_vocabulary`, in the same order.
+its own module, an entry here and its name in `equalizer.plant.effect_vocabulary`, in the same order; the other places
+(words, roles, tests) are listed in docs/contributing.md.
 """
 
 from equalizer.effects import (

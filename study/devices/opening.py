@@ -122,7 +122,7 @@ def _check_acceptance(name: str, info: DeviceInfo, settings: DeviceSettings) -> 
 def open_linkage(name: str) -> "Iterator[LinkageSource]":
     """Open the source of a device's linkage data: joint angles, Jacobian and inertia by position. Nothing moves, and a
     real device stays braked. Raises `DeviceError`."""
-    if name in REAL_DEVICES:
+    if name in MODELS:
         from study.devices.force_dimension.linkage import open_vendor_linkage
 
         with open_vendor_linkage(name) as linkage:
@@ -131,16 +131,12 @@ def open_linkage(name: str) -> "Iterator[LinkageSource]":
         from study.devices.simulated.simulated_linkage import make_simulated_linkage
 
         yield make_simulated_linkage()
+    elif name in REAL_DEVICES or ":" in name:
+        happened = "made from a file, which contains all that is known of it" if ":" in name else "of another vendor"
+        remedy = f"Calibrate {SIMULATED} or a device of {', '.join(MODELS)}."
+        raise DeviceError("This device has no linkage that can be read", f"{name!r} is {happened}.", remedy)
     else:
-        raise (
-            _make_unknown_device_error(name)
-            if ":" not in name
-            else DeviceError(
-                "This device has no linkage that can be read",
-                f"{name!r} is made from a file, which contains all that is known of it.",
-                f"Calibrate {SIMULATED} or a device of {', '.join(REAL_DEVICES)}.",
-            )
-        )
+        raise _make_unknown_device_error(name)
 
 
 def _make_unknown_device_error(name: str) -> DeviceError:
@@ -194,9 +190,9 @@ def check_loop_priority() -> DeviceFinding:
 
 
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:
-    """Examine a real device and its driver, with zero force; empty for other devices. Problems are returned as
-    findings, not raised."""
-    if name not in REAL_DEVICES:
+    """Examine a device of Force Dimension and its driver, with zero force; empty for other devices. Problems are
+    returned as findings, not raised."""
+    if name not in MODELS:
         return ()
     from study.devices.force_dimension.findings import examine
 
@@ -204,10 +200,12 @@ def examine_device(name: str) -> tuple[DeviceFinding, ...]:
 
 
 def calibrate_device(name: str, timeout_s: float) -> None:
-    """Wait, at most `timeout_s` (s), until a person has moved the handle of a real device into its calibration
-    position. Raises `DeviceError`, also for a device that is not real."""
-    if name not in REAL_DEVICES:
-        raise DeviceError("There is nothing to calibrate", f"{name!r} is no real device.", "Leave --calibrate out.")
+    """Wait, at most `timeout_s` (s), until a person has moved the handle of a device of Force Dimension into its
+    calibration position. Raises `DeviceError`, also for any other device."""
+    if name not in MODELS:
+        raise DeviceError(
+            "There is nothing to calibrate", f"{name!r} is no device of Force Dimension.", "Leave --calibrate out."
+        )
     from study.devices.force_dimension.findings import calibrate
 
     calibrate(name, timeout_s)

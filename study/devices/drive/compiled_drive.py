@@ -147,19 +147,19 @@ def _attend_tick(  # noqa: PLR0913 - as above
 ) -> int:
     """Wait for the next tick, record the ticks that were missed meanwhile, run the due tick, and record how late it
     ended. Returns one of the return codes above."""
-    calls, loop_cells, state, return_code = rig[0], loop_state[0], governor[0], RUNNING
+    calls, loop_cells, state = rig[0], loop_state[0], governor[0]
     begin_s = _wait_for_tick(calls, loop_cells)
     if loop_cells[RIG_GONE] != 0.0 or state[PHASE] == IDLE:
         return FINISHED
     gap_s, loop_cells[LAST_S] = begin_s - loop_cells[LAST_S], begin_s
     if gap_s > loop_cells[LONGEST_GAP_S]:
         return GAP
-    due_tick = int((begin_s - loop_cells[STARTED_S]) * loop_cells[RATE_HZ] + TICK_TOLERANCE)
-    missed_count = due_tick - int(loop_cells[LAST_TICK]) - 1
-    if missed_count > 0:
-        record_missed(state, governor[3], governor[6], missed_count)
-    if missed_count >= 0:
-        return_code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
+    # At least the awaited tick: long after the start of the clock, its rounding exceeds TICK_TOLERANCE.
+    awaited_tick = int(loop_cells[LAST_TICK]) + 1
+    due_tick = max(awaited_tick, int((begin_s - loop_cells[STARTED_S]) * loop_cells[RATE_HZ] + TICK_TOLERANCE))
+    if due_tick > awaited_tick:
+        record_missed(state, governor[3], governor[6], due_tick - awaited_tick)
+    return_code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
     loop_cells[LAST_TICK] = due_tick
     if return_code <= RUNNING:
         end_s = read_clock_s(calls)

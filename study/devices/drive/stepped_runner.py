@@ -10,6 +10,7 @@ once more, so that a late write leaves no force on the device.
 """
 
 import contextlib
+import math
 import threading
 from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
@@ -90,6 +91,8 @@ class SteppedRunner:
         self._compiled = CompiledTicks(compiled_io, governor, self.loop_state) if compiled_io is not None else None
         self.loop_state[STAMPS] = now_s is not None
         self._close_requested = self._disconnect_finished = False
+        self._drops_force_after_s, self._decided_s = rig.drops_force_after_s, -math.inf
+        """As the rig reports it, and time (s) at which the last force of ticks from Python was decided."""
         self._zero_writer = StandbyThread(lambda: rig.write(np.zeros(3)), "force off")
         self._device_closer = StandbyThread(rig.close, "disconnect")
 
@@ -210,14 +213,20 @@ class SteppedRunner:
         self._device_closer.end()
 
     def _run_tick(self) -> bool:
-        """Run a tick from Python, in the order of `compiled_drive._run_tick`. Returns whether the force is off and
-        stays off, or the rig is gone."""
+        """Run a tick from Python, in the order of `compiled_drive._run_tick`. A stimulus whose force the hardware has
+        dropped since the last tick, which was too long ago, ends. Returns whether the force is off and stays off, or
+        the rig is gone."""
         governor = self._governor
         reading = self._take_reading()
         if self._is_rig_gone:
             return True
         if self._now_s is not None:
-            governor.state[cells.READING_TIME_S] = self._now_s()
+            governor.state[cells.READING_TIME_S] = now_s = self._now_s()
+            pause_s, self._decided_s = now_s - self._decided_s, now_s
+            has_force = governor.state[cells.FORCE : cells.FORCE + 3].any()
+            if has_force and pause_s > self._drops_force_after_s > 0:  # the hardware has dropped it meanwhile
+                self.drop(Fault.STALLED)
+                return True
         self.loop_state[DECIDING] = 1.0
         is_finished = govern.tick(
             governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force

@@ -125,11 +125,11 @@ def _parse_settings(text: str) -> LabSettings:
 
 def write_sensor_table(sensor_table: str) -> Path:
     """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
-    previous file, if not empty, is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or
-    written, or the new content is not valid."""
-    read_lab_settings()
+    previous file, if not empty, is kept as `NAME.before`. Raises `DeviceError`, with the table as its remedy, where the
+    file cannot be read or written, or the new content is not valid."""
     path = locate_lab_file()
     try:
+        read_lab_settings()
         previous_text = path.read_text("utf-8-sig") if path.exists() else ""
         text = _replace_sensor_table(previous_text, sensor_table)
         _parse_settings(text)
@@ -139,12 +139,14 @@ def write_sensor_table(sensor_table: str) -> Path:
         if previous_text:
             path.replace(path.with_name(f"{path.name}.before"))
         new_path.replace(path)
-    except (OSError, ValueError) as error:
-        raise DeviceError(
-            "The calibration was not kept",
-            f"{path} could not be written: {error}.",
-            "Put the table into that file by hand (docs/hardware.md).",
-        ) from error
+    except (DeviceError, OSError, ValueError) as error:
+        cause = (
+            f"{error.title}. {error.happened}"
+            if isinstance(error, DeviceError)
+            else f"{path} could not be written: {error}."
+        )
+        remedy = f"Put this table into that file by hand (docs/hardware.md):\n{sensor_table}"
+        raise DeviceError("The calibration was not kept", cause, remedy) from error
     return path
 
 

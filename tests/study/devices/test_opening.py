@@ -216,6 +216,14 @@ def test_a_driver_that_cannot_show_its_force_is_not_accepted(own):
         open_device("own", SETTINGS, RealClock(), seed=1, own_process=False)
 
 
+def test_what_a_single_vendor_s_driver_offers_is_refused_for_a_driver_of_a_lab_s_own(own):
+    assert opening.examine_device("own") == ()
+    with pytest.raises(DeviceError, match="'own' is no device of Force Dimension"):
+        opening.calibrate_device("own", 1.0)
+    with pytest.raises(DeviceError, match="'own' is of another vendor"), opening.open_linkage("own"):
+        pass
+
+
 @pytest.mark.parametrize("name", [name for name in RIGS_BY_NAME if name not in SIMULATIONS])
 def test_no_device_that_is_not_simulated_opens_for_a_hand_without_an_acceptance(name, monkeypatch, tmp_path):
     """Behind each name stands a driver that checks nothing itself."""

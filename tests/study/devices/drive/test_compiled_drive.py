@@ -216,6 +216,31 @@ def test_late_waits_and_long_work_are_counted_and_played_the_same_both_ways(play
     assert health.fault is {10: Fault.LOST, 11: Fault.STALLED}.get(seed, Fault.STOPPED)
 
 
+class TimeOfAYear(ScriptedTime):
+    """The computer has run for so long that its clock, as a float, has steps of 4 ns; each look at it takes a step."""
+
+    def __init__(self, ticks: int) -> None:
+        super().__init__([], [0.0] * ticks)
+        self.time_s = 2.5e7 + 0.1234567
+
+    def now_s(self) -> float:
+        self.time_s += 2.0**-28
+        return self.time_s
+
+    def _now(self, clock: int, into) -> int:
+        self.now_s()
+        return super()._now(clock, into)
+
+    def _wait_until(self, until_s: float) -> int:
+        self.time_s = max(self.time_s, until_s + SPIN_S - 4e-8)
+        return 0
+
+
+def test_a_clock_that_has_run_for_a_year_makes_no_tick_late(played):
+    health = played(TimeOfAYear(500), 0, compiled=True)[5]
+    assert health.ticks > 500 and (health.late_ticks, health.missed_ticks) == (0, 0)
+
+
 def test_the_comparison_tells_a_tick_that_is_a_microsecond_later(played):
     """The control: what is compared depends on the times."""
     late_s, work_s = script(np.random.default_rng(1), 300)

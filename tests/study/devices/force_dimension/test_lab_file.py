@@ -67,8 +67,9 @@ def test_comments_above_the_next_table_are_not_those_of_the_old_calibration(file
 def test_nothing_changes_where_the_file_cannot_be_used_or_the_table_is_none(file):
     file.parent.mkdir()
     file.write_text("effector_mass_kg = ")
-    with pytest.raises(DeviceError, match="cannot be used"):
+    with pytest.raises(DeviceError, match="was not kept.*cannot be used") as refused:
         write_sensor_table(TABLE)
+    assert TABLE in refused.value.do_now  # it was six positions' work
     file.write_text(OLD)
     with pytest.raises(DeviceError, match="was not kept"):
         write_sensor_table(TABLE.replace("bias", "bais"))

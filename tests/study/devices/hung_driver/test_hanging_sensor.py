@@ -1,15 +1,18 @@
 """A sensor or a driver that hangs: the force goes all the same."""
 
+import contextlib
 import threading
 import time
 
 import numpy as np
 import pytest
 
+from study.devices.clock import RealClock
 from study.devices.device import Fault
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.governor import govern
 from study.devices.governor.governor import Governor
+from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 from tests.study.devices.hung_driver.patience import alive, hold, wait_until
 
@@ -30,6 +33,25 @@ def test_a_sensor_that_hangs_loses_the_force_although_the_program_is_alive(devic
     assert device.release().health.fault is Fault.LOST
     with pytest.raises(DeviceError, match=r"no sign of life\)\. Its force is off"):
         device.hold(rigs.push())
+
+
+def test_a_force_that_the_hardware_dropped_while_the_loop_was_late_does_not_come_back(rigs, rig):
+    """Late by less than makes a loop count as hanging."""
+
+    def be_late_once() -> None:
+        rig.before_sensing = None
+        written_before.append(len(rig.written_n))
+        time.sleep(0.075)
+
+    written_before: list[int] = []
+    rig.drops_force_after_s = 0.05
+    with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, RealClock())) as device:
+        hold(device, rigs, rig)
+        rig.before_sensing = in_loop(be_late_once)
+        alive(device, 0.2)
+        assert device.fault() in (Fault.STALLED, Fault.LOST)  # LOST: on a busy computer, later than that
+    written = rig.written_n[written_before[0] :]
+    assert written and not np.any(written)
 
 
 def test_asking_for_faults_alone_finds_the_hanging_loop_too(device, rigs, rig, hang):
