@@ -29,7 +29,7 @@ METHOD_PARAGRAPHS = (
     "that it hides the effect as far as possible.",
     "Labels were hashed with a salt before the first diagnosis (labels.sha256). The diagnosis ran in separate "
     "processes that were given the open folder only; they could not import the bench and could not open any other "
-    "file. Afterwards every label, recording and model was compared with its hash.",
+    "file of the test. Afterwards every label and every file of a case was compared with its hash.",
     "An effect is detectable where the error of the re-tuned model is more than 1.25 times the noise in some "
     "channel, on held-out samples. A diagnosis that failed counts as a miss.",
 )

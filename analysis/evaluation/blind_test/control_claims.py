@@ -8,6 +8,7 @@ the inputs.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from analysis.diagnosis.document import Diagnosis
 
@@ -54,23 +55,17 @@ def _has_no_mismatch(answers: Sequence[Diagnosis | None]) -> bool:
     return all(answer is not None and answer.verdict in ("no_mismatch", "parameters") for answer in answers)
 
 
-def _has_equal_answers(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether all answers have the same verdict, effects and axes, and at least one effect; False if any is None."""
-    distinct_answers = {_list_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
-    return len(distinct_answers) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
-
-
-def _has_equal_answers_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether all answers have the same verdict and effects, and at least one effect; axes may differ. False if an
-    answer is None."""
-    distinct_answers = {_list_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
+def _has_equal_answers(answers: Sequence[Diagnosis | None], with_axes: bool = True) -> bool:
+    """Whether all answers have the same verdict, effects and, if `with_axes`, axes, and at least one effect; False if
+    any is None."""
+    distinct_answers = {_list_verdict_and_effects(answer, with_axes) for answer in answers if answer is not None}
     return len(distinct_answers) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
 def _has_exchanged_axes(answers: Sequence[Diagnosis | None]) -> bool:
     """Whether two answers have the same verdict and effects, at least one, and each effect is on another axis in the
     second; False where an effect has no axis or an answer is None."""
-    if not _has_equal_answers_but_axes(answers):
+    if not _has_equal_answers(answers, with_axes=False):
         return False
     first_axes, second_axes = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
     return all(
@@ -111,7 +106,7 @@ CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
     "not explained": _has_no_explained_answer,
     "nothing": _has_no_mismatch,
     "same": _has_equal_answers,
-    "same but axes": _has_equal_answers_but_axes,
+    "same but axes": partial(_has_equal_answers, with_axes=False),
     "axis exchanged": _has_exchanged_axes,
     "opposite": _has_opposite_signs,
 }

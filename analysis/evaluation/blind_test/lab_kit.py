@@ -22,10 +22,10 @@ class Change:
     name: str
     instruction: str
     effects: tuple[str, ...]
-    """Effects of which any is a right answer; empty for the control. The value is a parameter of the first of them."""
+    """Effects of which any is a right answer; empty for the control."""
     unit: str
-    """Unit of the value that the lab writes down for this change, the same as of the effect's first parameter in a
-    linear SI model; empty where there is none."""
+    """Unit of the value that the lab writes down for this change, the same as of the first parameter of each of these
+    effects in a linear SI model; empty where there is none."""
 
 
 CHANGES: tuple[Change, ...] = (
@@ -56,7 +56,8 @@ CHANGES: tuple[Change, ...] = (
     ),
     Change(
         "held_handle",
-        "One hand holds the handle lightly, as a pen, for the whole recording.",
+        "One hand holds the handle lightly, as a pen, for the whole recording, of a copy of the protocol with hand = "
+        '"held" (docs/kit.md).',
         ("hand_impedance", "time_varying_grip"),
         "",
     ),
@@ -95,10 +96,10 @@ class ScoredLabel:
     """Effects of its returned set (the named ones and their inseparable rivals), separated by spaces."""
     right: bool
     inside: bool | None
-    """Whether the written value lies in the 95 % interval (ends included) of the first parameter of the change's first
-    effect. None where no value was written, the change has no unit, or that effect was not named or has no interval in
-    this unit (as on a rotating device); False where the diagnosis is missing although a value with a unit was
-    written."""
+    """Whether the written value lies in the 95 % interval (ends included) of the first parameter of the named effect,
+    if it is one of the change. None where no value was written, the change has no unit, no such effect was named, or
+    it has no interval in this unit (as on a rotating device); False where the diagnosis is missing although a value
+    with a unit was written."""
 
 
 def score_label(label: Label, diagnosis: Diagnosis) -> ScoredLabel:
@@ -137,7 +138,7 @@ def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -
         return None
     for effect in diagnosis.effects:
         estimate = next(iter(effect.parameters.values()), None)
-        if effect.effect != change.effects[0] or estimate is None or estimate.ci95 is None:
+        if effect.effect not in change.effects or estimate is None or estimate.ci95 is None:
             continue
         if estimate.unit == change.unit:
             return estimate.ci95[0] <= value <= estimate.ci95[1]

@@ -6,7 +6,7 @@ A bank is a set of simulated recordings, with concealed effects or none. Outcome
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, isnan
 
 from analysis.diagnosis.document import Diagnosis, NamedEffect
 
@@ -62,8 +62,9 @@ class AnsweredCase:
 
     def compute_worst_error(self, stage: str) -> float:
         """Compute the rms error on held-out samples over the noise's rms, in the channel where it is largest; NaN where
-        no errors are known. stage: "before", "retuned" or "after"."""
-        return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
+        no errors are known. Channels of unknown error (NaN) are left out. stage: "before", "retuned" or "after"."""
+        errors = self.channel_errors.get(stage, {}).values()
+        return max((error for error in errors if not isnan(error)), default=float("nan"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

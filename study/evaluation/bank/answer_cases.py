@@ -22,8 +22,8 @@ from typing import Any, cast
 import analysis.diagnosis
 import equalizer
 import study
-from study.evaluation.bank.proof_folder import ANSWER_FILE, CLEAN_FOLDER, MODEL_FILE, RECORDING_FILE, SETTINGS_FILE
-from study.store.disk.provenance import compute_sha256
+from study.evaluation.bank.proof_folder import ANSWER_FILE, BANK_FILE, CLEAN_FOLDER, MODEL_FILE, SETTINGS_FILE
+from study.evaluation.bank.proof_seals import hash_case_files
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
@@ -40,7 +40,7 @@ that this module has built."""
 def main(arguments: list[str]) -> None:
     """Read case names from standard input until it ends; answer each and print its name. arguments: the folder of open
     cases."""
-    open_folder = Path(arguments[0]).resolve()
+    open_folder = Path(arguments[0]).absolute()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all; the parent ends this process
     isolate_process(open_folder)
     engine_hash = compute_engine_digest()
@@ -52,10 +52,12 @@ def main(arguments: list[str]) -> None:
 
 def isolate_process(open_folder: Path) -> None:
     """Block the import of the challenge, and install an audit hook: from now on this process cannot open the files of
-    the challenge, open or list anything in the parent folder of `open_folder` but `open_folder` itself, or start a
-    program. The import then raises ImportError, the rest PermissionError."""
+    the challenge, open or list anything of the bank but `open_folder`, or start a program. The import then raises
+    ImportError, the rest PermissionError. The bank is the parent folder of `open_folder`, or for follow-ups and
+    controls, which lie in the folder of another bank, that folder."""
     sys.modules[CHALLENGE_PACKAGE] = cast(ModuleType, None)
-    bank_folder, real_open_folder = os.path.realpath(open_folder.parent), os.path.realpath(open_folder)
+    bank_folders = [open_folder.parent, *(path for path in open_folder.parents if (path / BANK_FILE).exists())]
+    bank_folder, real_open_folder = os.path.realpath(bank_folders[-1]), os.path.realpath(open_folder)
     challenge_folder = os.path.realpath(Path(study.__path__[0]).joinpath(*CHALLENGE_PACKAGE.split(".")[1:]))
 
     def is_inside(path: str, folder: str) -> bool:
@@ -77,12 +79,6 @@ def isolate_process(open_folder: Path) -> None:
     sys.addaudithook(audit)
 
 
-def hash_other_recordings(case_folder: Path) -> dict[str, str]:
-    """Compute the SHA-256 of every recording of a case but the first, by its path relative to `case_folder`."""
-    paths = [path for path in sorted(case_folder.rglob("*.h5")) if path != case_folder / RECORDING_FILE]
-    return {str(path.relative_to(case_folder)): compute_sha256(path) for path in paths}
-
-
 def answer_case(case_folder: Path, engine_hash: str) -> None:
     """Diagnose the case in `case_folder` and write answer.json atomically. An exception of the diagnosis is
     written as a failed answer. engine_hash: from `compute_engine_digest`."""
@@ -95,9 +91,7 @@ def answer_case(case_folder: Path, engine_hash: str) -> None:
         "name": case_folder.name,
         "seconds": time.perf_counter() - start_s,
         "cpu_seconds": time.process_time() - processor_start_s,
-        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
-        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
-        "others_sha256": hash_other_recordings(case_folder),
+        **hash_case_files(case_folder),
         "engine": engine_hash,
         "knows_the_challenge": is_challenge_loaded(),
     }

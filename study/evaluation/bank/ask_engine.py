@@ -31,7 +31,7 @@ from study.workflows.run_on_executor import run_tasks
 CASE_TIMEOUT_S = 1200.0
 """Longest wait for one case (s). Chosen: twenty times the usual limit of the search (`seal_cases.SEARCH_CPU_S`)."""
 POLL_INTERVAL_S = 0.5
-"""Interval at which the calling thread checks that the threads of the processes still run (s). Chosen."""
+"""Longest single wait of the calling thread for an answer (s): on Windows it cannot be interrupted. Chosen."""
 MAX_ATTEMPTS = 2
 """Attempts per case and run; the second, because a process may have been killed from outside. Chosen."""
 
@@ -119,11 +119,9 @@ def diagnose_and_count(
     on_done: Callable[[int, int], None],
     *,
     keep: bool,
-    diagnosable: Sequence[str] | None = None,
 ) -> None:
     """Diagnose the cases `case_names` that have no answer, calling `on_done(answered, total)`. keep: do not delete the
-    recordings of cases that are answered now. diagnosable: those of `case_names` that can be diagnosed; None = all.
-    Raises StudyError where `diagnose_cases` does."""
+    recordings of cases that are answered now. Raises StudyError where `diagnose_cases` does."""
     answered_count = sum(is_answered(folder.open / case_name) for case_name in case_names)
     on_done(answered_count, len(case_names))
 
@@ -135,35 +133,46 @@ def diagnose_and_count(
             delete_answered_recordings(folder.open / case_name)
         on_done(answered_count, len(case_names))
 
-    diagnose_cases(folder, case_names if diagnosable is None else diagnosable, workers, on_answered)
+    diagnose_cases(folder, case_names, workers, on_answered)
 
 
 def diagnose_cases(
     folder: ProofFolder, case_names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]
 ) -> None:
     """Diagnose the cases `case_names` that have no answer yet; blocks until done. `on_answered(case name)` is called in
-    this thread after each case, also after a failed one. Raises StudyError if all worker threads ended early; with an
-    executor, its exceptions."""
-    pending_names, answered_names = SimpleQueue[str](), SimpleQueue[str]()
+    this thread after each case, also after a failed one. Raises StudyError or OSError where a case has neither answer
+    nor recording, a process cannot be started or a failure not be written; with an executor, its exceptions."""
+    pending_names, answered_names = SimpleQueue[str](), SimpleQueue[str | Exception]()
     unanswered_names = [case_name for case_name in case_names if not is_answered(folder.open / case_name)]
+    _require_recordings(folder, unanswered_names)
     if isinstance(workers, Executor):
         _diagnose_on_executor(folder, unanswered_names, workers, on_answered)
         return
     for case_name in unanswered_names:
         pending_names.put(case_name)
-    with _start_diagnosis_processes(
-        folder, min(workers, len(unanswered_names)), pending_names, answered_names
-    ) as threads:
+    with _start_diagnosis_processes(folder, min(workers, len(unanswered_names)), pending_names, answered_names):
         missing_count = len(unanswered_names)
         while missing_count:
             try:
-                case_name = answered_names.get(timeout=POLL_INTERVAL_S)
+                answered = answered_names.get(timeout=POLL_INTERVAL_S)
             except Empty:
-                if not any(thread.is_alive() for thread in threads) and answered_names.empty():
-                    raise _make_processes_ended_error(folder, missing_count) from None
                 continue
+            if isinstance(answered, Exception):
+                raise answered
             missing_count -= 1
-            on_answered(case_name)
+            on_answered(answered)
+
+
+def _require_recordings(folder: ProofFolder, unanswered_names: Sequence[str]) -> None:
+    """Raise StudyError where the recording of a case is missing: it is deleted once the case is answered, and an answer
+    that was removed later cannot be given again."""
+    if missing_names := [name for name in unanswered_names if not (folder.open / name / RECORDING_FILE).exists()]:
+        raise StudyError(
+            "A case has neither an answer nor a recording",
+            f"In {folder.open} there is no {RECORDING_FILE} of {', '.join(missing_names[:5])}.",
+            f"Delete the folder {folder.path}, and run the same command again: its cases are drawn again.",
+            saved="Nothing was changed.",
+        )
 
 
 def _diagnose_on_executor(
@@ -196,8 +205,11 @@ def diagnose_sent_case(case_name: str, case_files: FileContents) -> str | None:
 
 @contextmanager
 def _start_diagnosis_processes(
-    folder: ProofFolder, worker_count: int, pending_names: SimpleQueue[str], answered_names: SimpleQueue[str]
-) -> Iterator[list[threading.Thread]]:
+    folder: ProofFolder,
+    worker_count: int,
+    pending_names: SimpleQueue[str],
+    answered_names: SimpleQueue[str | Exception],
+) -> Iterator[None]:
     """Context with a thread per worker process (`_request_pending_answers`). On exit, also by an exception, the pending
     names are dropped and the processes killed."""
     diagnosis_processes = [DiagnosisProcess(folder) for _ in range(worker_count)]
@@ -210,10 +222,11 @@ def _start_diagnosis_processes(
     for thread in threads:
         thread.start()
     try:
-        yield threads
+        yield
     finally:
-        while not pending_names.empty():
-            pending_names.get()
+        with suppress(Empty):
+            while True:
+                pending_names.get_nowait()
         for diagnosis_process in diagnosis_processes:
             diagnosis_process.end()
         for thread, diagnosis_process in zip(threads, diagnosis_processes, strict=True):
@@ -225,31 +238,23 @@ def _request_pending_answers(
     diagnosis_process: DiagnosisProcess,
     folder: ProofFolder,
     pending_names: SimpleQueue[str],
-    answered_names: SimpleQueue[str],
+    answered_names: SimpleQueue[str | Exception],
 ) -> None:
     """Request the answer of each name from `pending_names` until it is empty; put it into `answered_names` once an
-    answer or a failure is written. Returns early, without a failure, where the process was ended by `end`."""
-    while True:
-        try:
+    answer or a failure is written. Returns early, without a failure, where the process was ended by `end`, and after an
+    exception, which is put into `answered_names`."""
+    try:
+        while True:
             case_name = pending_names.get_nowait()
-        except Empty:
-            return
-        if not any(diagnosis_process.request_answer(case_name) for _ in range(MAX_ATTEMPTS)):
-            if diagnosis_process.ended:
-                return
-            _write_failed_answer(folder.open / case_name)
-        answered_names.put(case_name)
-
-
-def _make_processes_ended_error(folder: ProofFolder, missing_count: int) -> StudyError:
-    """Make the error for threads that ended before all cases were answered. missing_count: number of unanswered
-    cases."""
-    return StudyError(
-        "The processes of the diagnosis ended before their work was done",
-        f"{missing_count} cases have no answer; the last output of the processes is in {folder.log_file}.",
-        "Run the same command again: it continues where it stopped.",
-        saved=f"All answers so far are in {folder.open}.",
-    )
+            if not any(diagnosis_process.request_answer(case_name) for _ in range(MAX_ATTEMPTS)):
+                if diagnosis_process.ended:
+                    return
+                _write_failed_answer(folder.open / case_name)
+            answered_names.put(case_name)
+    except Empty:
+        return
+    except Exception as problem:  # noqa: BLE001 - raised again in the thread that waits for the answers
+        answered_names.put(problem)
 
 
 def is_answered(case_folder: Path) -> bool:

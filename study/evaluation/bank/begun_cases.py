@@ -48,7 +48,7 @@ def finish_begun_cases(folder: ProofFolder) -> Iterator[None]:
 def _publish_or_remove(folder: ProofFolder) -> None:
     """Move begun cases that have a label to `open`, and remove the others."""
     begun_folders = sorted(folder.unfinished.iterdir()) if folder.unfinished.exists() else []
-    labels = [read_text(path) for path in sorted(folder.sealed.glob("*.json"))] if begun_folders else []
+    labels = [read_text(path) for path in folder.labels] if begun_folders else []
     for case_folder in begun_folders:
         # The label of a follow-up contains the names of several cases, each in quotation marks.
         if any(f'"{case_folder.name}"' in label for label in labels):

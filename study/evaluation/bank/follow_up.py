@@ -17,18 +17,17 @@ from analysis.diagnosis.document import diagnosis_from_json
 from analysis.diagnosis.next_experiment.experiment_menu import Experiment, list_experiments
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
-from study.evaluation.bank.answer_cases import hash_other_recordings
 from study.evaluation.bank.ask_engine import Workers, diagnose_and_count
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
 from study.evaluation.bank.proof_folder import (
     FURTHER_RECORDING_FILE,
     MODEL_FILE,
-    RECORDING_FILE,
     SETTINGS_FILE,
     ProofFolder,
     open_proof_folder,
 )
 from study.evaluation.bank.proof_seals import (
+    hash_case_files,
     is_answer_to_sealed_case,
     make_broken_seal_error,
     read_answer,
@@ -37,7 +36,6 @@ from study.evaluation.bank.proof_seals import (
 )
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
 from study.evaluation.challenge.drive_plan import RATE_HZ
-from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
@@ -140,9 +138,7 @@ def _write_case(
     return {
         "name": case_folder.name,
         "words": "; ".join(experiment.words for experiment in experiments),
-        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
-        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
-        "others_sha256": hash_other_recordings(case_folder),
+        **hash_case_files(case_folder),
     }
 
 

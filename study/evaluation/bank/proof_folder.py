@@ -6,15 +6,12 @@ does not reveal its number. next/ is the bank of follow-up cases, with the same 
 open/, but no labels; a bank of laws has the test motions of each case beside its label."""
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from filelock import FileLock, Timeout
-
 from study.errors import StudyError
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_lock import hold_file_lock
 from study.store.disk.json_document import parse_json
 from study.store.disk.text_file import read_text, write_text
 
@@ -41,6 +38,11 @@ class ProofFolder:
         return self.path / "sealed"
 
     @property
+    def labels(self) -> list[Path]:
+        """Paths of the labels, sorted by number. A file of another name, such as a copy, is none of them."""
+        return sorted(self.sealed.glob("[0-9][0-9][0-9][0-9][0-9].json"))
+
+    @property
     def seals_file(self) -> Path:
         """File with the SHA-256 of each label, in the format of `sha256sum --check`."""
         return self.path / "labels.sha256"
@@ -60,6 +62,8 @@ class ProofFolder:
         return self.sealed / f"{number:05d}.json"
 
 
+BANK_FILE = "bank.json"
+"""File with the settings of a bank, in its folder."""
 RECORDING_FILE, MODEL_FILE, SETTINGS_FILE, ANSWER_FILE = "recording.h5", "model.toml", "settings.json", "answer.json"
 """Files in a case's folder under `open`; the last holds the answer of the diagnosis."""
 FURTHER_RECORDING_FILE = "recording_{}.h5"
@@ -77,7 +81,7 @@ def open_proof_folder(path: Path, seed: int, short_recordings: bool, bank_kind: 
 
     Raises StudyError where the folder contains other files or a bank with other settings.
     """
-    folder, bank_path = ProofFolder(path), path / "bank.json"
+    folder, bank_path = ProofFolder(path), path / BANK_FILE
     bank_settings = {
         "format": "hapteq-bank",
         "version": 1,
@@ -94,37 +98,29 @@ def open_proof_folder(path: Path, seed: int, short_recordings: bool, bank_kind: 
                 "Choose another folder with --out, or the same options to continue.",
                 saved="Nothing was changed.",
             )
-        return folder
-    if path.is_dir() and any(path.iterdir()):
+    elif path.is_dir() and any(path.iterdir()):
         raise StudyError(
             "A bank needs a folder of its own",
             f"{path} holds other files.",
             "Choose another name with --out, or empty it.",
             saved="Nothing was written.",
         )
+    else:
+        path.mkdir(parents=True, exist_ok=True)
+        write_text(bank_path, document_text)
+    # After the file, without which the folder could not be opened again where its writing failed.
     for subfolder in (folder.open, folder.sealed):
-        subfolder.mkdir(parents=True, exist_ok=True)
-    write_text(bank_path, document_text)
+        subfolder.mkdir(exist_ok=True)
     return folder
 
 
-@contextmanager
-def hold_proof_folder(folder: ProofFolder) -> Iterator[None]:
+def hold_proof_folder(folder: ProofFolder) -> AbstractContextManager[None]:
     """Hold the lock of a bank within the context: a second process would remove cases that the first is writing.
     Raises StudyError, without waiting, where another process holds it or the folder is not writable."""
-    lock = FileLock(folder.lock_file)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout as timeout:
-        raise StudyError(
-            "Another process works on this bank",
-            f"It holds {folder.lock_file}.",
-            "Wait until it has ended, or choose another folder with --out.",
-            saved="Nothing was changed.",
-        ) from timeout
-    except OSError as problem:
-        raise CannotWriteError(folder.lock_file, problem) from problem
-    try:
-        yield
-    finally:
-        lock.release()
+    held_error = StudyError(
+        "Another process works on this bank",
+        f"It holds {folder.lock_file}.",
+        "Wait until it has ended, or choose another folder with --out.",
+        saved="Nothing was changed.",
+    )
+    return hold_file_lock(folder.lock_file, held_error, "The bank's folder")

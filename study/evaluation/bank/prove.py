@@ -15,16 +15,16 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import ConcealedEffect, Outcome
 from analysis.evaluation.blind_test.score import Score, compute_score
 from study.errors import convert_interrupts
-from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
+from study.evaluation.bank.ask_engine import diagnose_and_count
 from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up
-from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, hold_proof_folder, open_proof_folder
-from study.evaluation.bank.proof_seals import read_label
+from study.evaluation.bank.proof_folder import ProofFolder, hold_proof_folder, open_proof_folder
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import (
     BankPlan,
     list_drawable_cases,
     read_case_names,
     redraw_recording,
+    restore_recordings,
     seal_cases,
 )
 from study.evaluation.bank.sealed_bank import (
@@ -81,10 +81,12 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
     step, the number done and the total. Raises StudyError where the folder belongs to another bank or another process
     works on it, a sealed file has changed, or the run is interrupted."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
-    case_numbers = [case_draw.number for case_draw in list_drawable_cases(plan)]
+    drawable_count = len(list_drawable_cases(plan))
     saved_text = f"All that is sealed and answered so far is in {path}."
     with convert_interrupts("The bank is not finished.", saved_text), hold_proof_folder(folder):
-        seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(case_numbers)))
+        seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, drawable_count))
+        # Not those that can be drawn here: the bank may have been sealed on a machine with MuJoCo.
+        case_numbers = [number for number in range(plan.cases) if folder.get_label_file(number).exists()]
         case_names = read_case_names(folder, case_numbers)
         _answer_cases(folder, plan, options, dict(zip(case_names, case_numbers, strict=True)), on_progress)
         outcomes = reveal_bank(folder, plan.cases, make_outcome)
@@ -117,9 +119,7 @@ def _answer_cases(
 ) -> None:
     """Diagnose the cases that have no answer yet; a deleted recording is drawn again. numbers_by_name: number of
     each case by its name."""
-    for name, number in numbers_by_name.items():
-        if not is_answered(folder.open / name) and not (folder.open / name / RECORDING_FILE).exists():
-            redraw_recording(folder.open / name, plan, read_label(folder.get_label_file(number)))
+    restore_recordings(folder, numbers_by_name, lambda case_folder, label: redraw_recording(case_folder, plan, label))
     diagnose_and_count(
         folder, tuple(numbers_by_name), options.diagnosis_workers, partial(on_progress, "diagnosing"), keep=options.keep
     )

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
+from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
 from study.evaluation.bank.proof_folder import MODEL_FILE, RECORDING_FILE, SETTINGS_FILE, ProofFolder
-from study.evaluation.bank.proof_seals import read_label, seal
+from study.evaluation.bank.proof_seals import hash_case_files, read_label, seal
 from study.evaluation.challenge.draw_bank import CaseDraw, draw_case_plan, generate_case
 from study.evaluation.challenge.draw_case import Case
 from study.evaluation.challenge.second_engine import mujoco_access
@@ -107,9 +108,34 @@ def format_settings(excluded_effects: Sequence[str], processor_s: float | None =
     return json.dumps({"without": list(excluded_effects), "processor_s": processor_s}) + "\n"
 
 
+def restore_recordings(
+    folder: ProofFolder, numbers_by_name: Mapping[str, int], redraw: Callable[[Path, dict[str, Any]], object]
+) -> None:
+    """Write the deleted recordings of cases that have no answer, as after an answer was removed. numbers_by_name:
+    number of each case by its name; redraw: draws and writes the recording of a case, from its folder and label."""
+    for name, number in numbers_by_name.items():
+        if not is_answered(folder.open / name) and not (folder.open / name / RECORDING_FILE).exists():
+            redraw(folder.open / name, read_label(folder.get_label_file(number)))
+
+
 def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
-    """Draw and write the recording of a sealed case again. Raises StudyError where its hash is not the sealed one."""
-    case = generate_case(draw_case_plan(plan.seed, label["number"], plan.brief), label["name"])
+    """Draw and write the recording of a sealed case again. Raises StudyError where its hash is not the sealed one, or
+    MuJoCo is needed and not installed."""
+    try:
+        case = generate_case(draw_case_plan(plan.seed, label["number"], plan.brief), label["name"])
+    except ImportError as problem:
+        raise StudyError(
+            "A device of the bank cannot be drawn again",
+            f"Case {label['number']} was drawn by MuJoCo, which is not installed here.",
+            "Install it (pip install 'hapteq[prove]'), and run the same command again.",
+            saved="All answers are kept.",
+        ) from problem
+    write_redrawn_recording(case_folder, case, label)
+    return case
+
+
+def write_redrawn_recording(case_folder: Path, case: Case, label: dict[str, Any]) -> None:
+    """Write the recording of a case that was drawn again. Raises StudyError where its hash is not that of the label."""
     write_recording(case_folder / RECORDING_FILE, case.recording, precision="float32", overwrite=True)
     if compute_sha256(case_folder / RECORDING_FILE) != label["recording_sha256"]:
         raise StudyError(
@@ -118,11 +144,10 @@ def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -
             "Run the bank with the versions that it was begun with (proof.json names them), or anew.",
             saved="All answers are kept.",
         )
-    return case
 
 
 def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str, Any]:
-    """Make the label of a case: its draw, the truth, the hashes of recording and model, and the salt."""
+    """Make the label of a case: its draw, the truth, the hashes of its files, and the salt."""
     draw_fields = asdict(case_draw)
     return {
         "name": case_folder.name,
@@ -132,8 +157,7 @@ def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str,
         "without": list(case_draw.excluded_effects),
         "truth": list_concealed_effects(case),
         "adds": case.detectability,
-        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
-        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
+        **hash_case_files(case_folder),
         "salt": secrets.token_hex(SALT_BYTES),
     }
 

@@ -53,28 +53,30 @@ def reveal_bank(
     is_unchanged: Callable[[dict[str, Any]], bool] = lambda label: True,
 ) -> tuple[OutcomeT, ...]:
     """Check the labels in the folder, and return the outcomes of the answered cases with numbers below `case_count`,
-    sorted by the names of their label files. make_outcome: makes an outcome from a label and its answer. is_unchanged:
+    sorted by number. make_outcome: makes an outcome from a label and its answer. is_unchanged:
     whether further files whose hashes the label holds are unchanged. Raises StudyError where a label is
     missing, a label or such a file has changed, or an answer was given to other files."""
     seals = read_seals(folder)
     outcomes: list[OutcomeT] = []
     # A label that was removed after it was sealed must not be left out of the score.
     broken_names = [name for name in seals if not (folder.path / name).exists()]
-    for path in sorted(folder.sealed.glob("*.json")):
+    for path in folder.labels:
         if seals.get(f"sealed/{path.name}") != compute_sha256(path):
             broken_names.append(path.name)
             continue
         label = read_label(path)
-        if not is_unchanged(label):
+        # A copy under another number must not be counted twice.
+        if path != folder.get_label_file(label["number"]) or not is_unchanged(label):
             broken_names.append(path.name)
             continue
         case_folder = folder.open / label["name"]
         if label["number"] >= case_count or not (case_folder / ANSWER_FILE).exists():
             continue
         answer = read_answer(case_folder)
-        if not is_answer_to_sealed_case(label, answer):
+        if is_answer_to_sealed_case(label, answer):
+            outcomes.append(make_outcome(label, answer))
+        else:
             broken_names.append(path.name)
-        outcomes.append(make_outcome(label, answer))
     if broken_names:
         raise make_broken_seal_error(broken_names, folder.path)
     return tuple(outcomes)

@@ -8,10 +8,13 @@ the digests of the code that answered, so that figures can be traced to it."""
 import json
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import analysis.diagnosis
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import compute_main_error
 from analysis.figures.blind_test_pictures import make_blind_test_pictures
@@ -20,7 +23,7 @@ from study.evaluation.bank.answer_cases import compute_engine_digest
 from study.evaluation.bank.proof_summary import list_remarks
 from study.evaluation.bank.prove import BlindTest
 from study.local_clock import format_local_now
-from study.store.disk.csv_rows import format_csv_table
+from study.store.disk.csv_rows import Row, format_csv_table
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import anonymise_arguments, gather_provenance, list_versions
 from study.store.disk.text_file import write_text
@@ -97,7 +100,7 @@ class FigureRow:
 def write_proof(result: BlindTest) -> None:
     """Write document, table, pictures and page into the test's folder, replacing earlier files. Raises StudyError where
     a file cannot be read or written."""
-    folder, commit_hash = result.folder.path, read_answering_commit(result)
+    folder, commit_hash = result.folder.path, read_answering_commit(result.folder.path, result.engines)
     score = result.score
     document = {
         "seed": result.plan.seed,
@@ -114,9 +117,8 @@ def write_proof(result: BlindTest) -> None:
         "controls": [asdict(control) for control in result.controls],
         "misses": [miss.number for miss in score.misses],
     }
-    write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
     rows = [_make_row(outcome, outcome in score.misses) for outcome in result.outcomes]
-    write_text(folder / TABLE, format_csv_table(rows, CaseRow), overwrite=True)
+    write_document(folder, document, rows, CaseRow)
     pictures = make_blind_test_pictures(result.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
     metadata = BlindTestMetadata(
@@ -134,16 +136,13 @@ def write_proof(result: BlindTest) -> None:
 
 
 def write_table(path: Path, result: BlindTest) -> None:
-    """Write the figures to `path` and the misses to `derive_misses_path(path)`. Comment lines at the head of the first
+    """Write the figures to `path` and the misses beside it, see `write_figures`. Comment lines at the head of the first
     table state the cases, the code and the seal of the labels. Raises StudyError where a file cannot be read or
     written."""
     calibration = result.score.calibration
-    figures = [
-        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in result.score.figures
-    ]
     named_count = sum(probability_bin.of for probability_bin in calibration.bins)
-    figures.append(
-        FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named_count)
+    calibration_figure = IntervalEstimate(
+        "expected calibration error", calibration.error, calibration.low, calibration.high, named_count
     )
     failed_controls = [control.name for control in result.controls if not control.held]
     controls_text = (
@@ -153,41 +152,55 @@ def write_table(path: Path, result: BlindTest) -> None:
     )
     lines = [
         f"# {len(result.outcomes)} cases, seeds {format_seed_range(result)}",
-        f"# commit {read_answering_commit(result)}, code of the diagnosis {' '.join(result.engines)}",
+        format_code_line(result.folder.path, result.engines),
         f"# follow-ups and controls by code {' '.join(result.other_engines) or 'none'}",
         f"# seal of the labels {result.seal}",
         f"# versions {json.dumps(list_versions())}",
         f"# controls {', not '.join((controls_text, *failed_controls))}",
     ]
-    write_text(path, "\n".join(lines) + "\n" + format_csv_table(figures, FigureRow), overwrite=True)
     misses = [_make_row(miss, True) for miss in result.score.misses]
-    write_text(derive_misses_path(path), format_csv_table(misses, CaseRow), overwrite=True)
+    write_figures(path, lines, (*result.score.figures, calibration_figure), misses, CaseRow)
 
 
-def derive_misses_path(path: Path) -> Path:
-    """Derive the path of the table of misses from that of the table of figures: `figures.csv` ->
+def write_document(folder: Path, document: Mapping[str, Any], rows: Sequence[Row], row_type: type[Row]) -> None:
+    """Write `proof.json` and `proof.csv`, a row per case, into `folder`, replacing earlier ones."""
+    write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
+    write_text(folder / TABLE, format_csv_table(rows, row_type), overwrite=True)
+
+
+def write_figures(
+    path: Path, comments: Sequence[str], figures: Sequence[IntervalEstimate], misses: Sequence[Row], row_type: type[Row]
+) -> None:
+    """Write the figures, after the comments, to `path`, and the misses beside it: `figures.csv`,
     `figures-misses.csv`."""
-    return path.with_name(f"{path.stem}-misses{path.suffix}")
+    rows = [FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in figures]
+    write_text(path, "\n".join(comments) + "\n" + format_csv_table(rows, FigureRow), overwrite=True)
+    misses_path = path.with_name(f"{path.stem}-misses{path.suffix}")
+    write_text(misses_path, format_csv_table(misses, row_type), overwrite=True)
 
 
-def read_answering_commit(result: BlindTest) -> str:
-    """Read the commit of the code that answered: that in an earlier `proof.json` by the same code; else the current
-    commit, where the current code gave the answers or none were given; else "unknown: …"."""
-    document = result.folder.path / DOCUMENT
+def read_answering_commit(folder: Path, engines: tuple[str, ...]) -> str:
+    """Read the commit of the code that answered: that in an earlier `proof.json` in `folder` by the same code; else the
+    current commit, where the current code gave the answers or none were given; else "unknown: …". engines: digests of
+    the code that answered."""
+    document = folder / DOCUMENT
     if document.exists():
         earlier_document = read_json(document, FORMAT, VERSION)
-        if earlier_document.get("engines") == list(result.engines) and isinstance(earlier_document.get("commit"), str):
+        if earlier_document.get("engines") == list(engines) and isinstance(earlier_document.get("commit"), str):
             return str(earlier_document["commit"])
     return (
-        read_current_commit()
-        if result.engines in ((), (compute_engine_digest(),))
-        else "unknown: the code has changed since"
+        read_current_commit() if engines in ((), (compute_engine_digest(),)) else "unknown: the code has changed since"
     )
 
 
 def format_seed_range(result: BlindTest) -> str:
     """Format the first and the last seed of the cases: "1 to 500"."""
     return f"{result.plan.seed} to {result.plan.seed + result.plan.cases - 1}"
+
+
+def format_code_line(folder: Path, engines: tuple[str, ...]) -> str:
+    """Format the comment line of a table that states the code that answered; arguments of `read_answering_commit`."""
+    return f"# commit {read_answering_commit(folder, engines)}, code of the diagnosis {' '.join(engines)}"
 
 
 def read_current_commit() -> str:

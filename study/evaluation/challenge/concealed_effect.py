@@ -73,8 +73,9 @@ class ConcealedEffect:
     """build(device, axis, values): a new device with the effect."""
 
 
-def replace_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> FloatArray:
-    """Replace columns of the row `axis` in a copy of a table (3, columns). cells: value by column."""
+def replace_cells(table: FloatArray, axis: int | slice, cells: Mapping[int, FloatArray | float]) -> FloatArray:
+    """Replace columns of the row or rows `axis` in a copy of a table (3, columns). cells: value, or one per row, by
+    column."""
     new_table = table.copy()
     for column, value in cells.items():
         new_table[axis, column] = value

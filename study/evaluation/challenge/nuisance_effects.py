@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.concealed_effect import replace_cells
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.friction_kernel import BRISTLE_STIFFNESS, LEVEL_NEGATIVE, LEVEL_POSITIVE
 from study.evaluation.challenge.handle_force_kernel import (
@@ -39,25 +39,12 @@ def add_nuisance_effects(device: Device, factor: float, seed: int) -> Device:
     return device
 
 
-def _replace_columns(table: FloatArray, column_values: dict[int, FloatArray | float]) -> FloatArray:
-    """Copy a parameter table (3 axes, columns) with some columns replaced. column_values: new values by column, (3,) or
-    a number for all axes."""
-    new_table = table.copy()
-    for column, values in column_values.items():
-        new_table[:, column] = values
-    return new_table
-
-
 def _add_dry_friction(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Set dry friction of 25 to 100 µN per axis, the same in both directions, with a bristle of 3e5 N/m (not scaled by
     factor)."""
     friction_n = factor * random.uniform(0.25e-4, 1e-4, 3)
-    return replace(
-        device,
-        friction=_replace_columns(
-            device.friction, {BRISTLE_STIFFNESS: 3e5, LEVEL_POSITIVE: friction_n, LEVEL_NEGATIVE: friction_n}
-        ),
-    )
+    cells = {BRISTLE_STIFFNESS: np.full(3, 3e5), LEVEL_POSITIVE: friction_n, LEVEL_NEGATIVE: friction_n}
+    return replace(device, friction=replace_cells(device.friction, slice(None), cells))
 
 
 def _add_cogging(device: Device, factor: float, random: np.random.Generator) -> Device:
@@ -68,21 +55,19 @@ def _add_cogging(device: Device, factor: float, random: np.random.Generator) -> 
         COGGING_PITCH: random.uniform(7e-4, 3e-3, 3),
         COGGING_PHASE: random.uniform(0.0, 2 * np.pi, 3),
     }
-    return replace(device, forces=_replace_columns(device.forces, dict(column_values)))
+    return replace(device, forces=replace_cells(device.forces, slice(None), column_values))
 
 
 def _add_cubic_stiffness(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Set a cubic stiffness of up to 40 N/m³ of either sign per axis (hardening or softening)."""
-    return replace(
-        device, forces=_replace_columns(device.forces, {CUBIC_STIFFNESS: factor * random.uniform(-40.0, 40.0, 3)})
-    )
+    cells = {CUBIC_STIFFNESS: factor * random.uniform(-40.0, 40.0, 3)}
+    return replace(device, forces=replace_cells(device.forces, slice(None), cells))
 
 
 def _add_quadratic_damping(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Set a quadratic damping of 0 to 0.004 N s²/m² per axis."""
-    return replace(
-        device, forces=_replace_columns(device.forces, {QUADRATIC_DAMPING: factor * random.uniform(0.0, 0.004, 3)})
-    )
+    cells = {QUADRATIC_DAMPING: factor * random.uniform(0.0, 0.004, 3)}
+    return replace(device, forces=replace_cells(device.forces, slice(None), cells))
 
 
 def _shift_mode_frequencies(device: Device, factor: float, random: np.random.Generator) -> Device:

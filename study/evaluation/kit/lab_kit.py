@@ -4,6 +4,7 @@ The seal is a commitment by hash: the SHA-256 of the table is published before t
 labels cannot be changed to suit the answers. `score_kit` scores the answers.
 """
 
+import math
 import secrets
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def draw_labels(table_path: Path, repeats: int, seed: int | None) -> tuple[Label
 
 def read_labels(table_path: Path) -> tuple[Label, ...]:
     """Read the rows of a table of labels. Raises CannotReadError; UnusableFileError for an invalid or empty table, an
-    unknown change, or a recording that appears twice."""
+    unknown change, a recording that appears twice or whose name is a path, or a value that is not finite."""
     try:
         labels = parse_csv_table(read_text(table_path), Label)
     except CsvError as error:
@@ -52,6 +53,17 @@ def read_labels(table_path: Path) -> tuple[Label, ...]:
         f"{suggest_word(label.change, tuple(CHANGES_BY_NAME))}"
         for label in labels
         if label.change not in CHANGES_BY_NAME
+    ]
+    problems += [
+        f"'{label.recording}' is no name of a recording: it must be the name of a file without its ending, such as "
+        "rec_01, without a folder or a blank at an end"
+        for label in labels
+        if not _is_plain_name(label.recording)
+    ]
+    problems += [
+        f"{label.recording}: its value is {label.value}, which is no finite number"
+        for label in labels
+        if label.value is not None and not math.isfinite(label.value)
     ]
     recording_names = [label.recording for label in labels]
     problems += [
@@ -63,6 +75,11 @@ def read_labels(table_path: Path) -> tuple[Label, ...]:
             table_path, "table of labels", tuple(problems) or ("it holds no recording",), CORRECT_TABLE_ADVICE
         )
     return labels
+
+
+def _is_plain_name(name: str) -> bool:
+    """Whether a name is that of a folder beside the others, so that two names never mean one diagnosis."""
+    return name.strip() == name and name not in ("", ".", "..") and not set(name) & set("/\\\0")
 
 
 def seal_labels(table_path: Path) -> str:

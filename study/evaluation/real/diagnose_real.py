@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_model_of
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
 from analysis.diagnosis.diagnose import diagnose
@@ -56,12 +55,10 @@ class _ImportedCase:
     """The imported recording with its model and reference recording."""
 
     recording: Recording
-    model: MechanicalModel
+    first_model: FirstModel
     """Model to be diagnosed, given or fitted to the recording."""
-    balances: tuple[Balance, ...] | None
-    """Force balances fitted to the recording; None where none was fitted."""
     remarks: tuple[str, ...]
-    """Sentences on the import and on the model."""
+    """Sentences on the import."""
     reference: Recording | None
     """Recording of the same device before the change, where there is one."""
 
@@ -89,12 +86,13 @@ def diagnose_real(
             names=(real_recording.name,),
             clean=() if case.reference is None else (case.reference,),
             fitted=real_recording.read_model() is None,
-            balances=case.balances,
+            balances=case.first_model.balances,
             time_left=time_left,
             guard=guard,
         )
-        findings = diagnose((case.recording,), case.model, settings, map_forked, on_progress)
-        findings = replace(findings, remarks=(*case.remarks, *findings.remarks))
+        findings = diagnose((case.recording,), case.first_model.model, settings, map_forked, on_progress)
+        first_remarks = case.first_model.list_remarks(findings.given, findings.diagnosis.error)
+        findings = replace(findings, remarks=(*case.remarks, *first_remarks, *findings.remarks))
         diagnosis = real_recording.found_map.source.map.diagnosis
         recording_names = (real_recording.folder.name, real_recording.name, real_recording.found_map.source.map.title)
         answer = make_real_answer(findings, case.recording, recording_names, diagnosis.nominal)
@@ -161,10 +159,8 @@ def _import_case(
     kept_signals = keep_common_signals((*prepared.recordings, *references))
     recording = kept_signals.recordings[0]
     first_model = _choose_model(real_recording, recording, bounds, on_progress)
-    remarks = (*prepared.remarks, *kept_signals.remarks, *first_model.remarks)
-    return _ImportedCase(
-        recording, first_model.model, first_model.balances, remarks, kept_signals.recordings[1] if references else None
-    )
+    remarks = (*prepared.remarks, *kept_signals.remarks)
+    return _ImportedCase(recording, first_model, remarks, kept_signals.recordings[1] if references else None)
 
 
 def _allows_force_balance(real_recording: RealRecording) -> bool:
@@ -275,8 +271,8 @@ def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: 
     """Compare the recordings before and after a change of the device: the named effects, and the errors of the model
     before and after it was re-tuned and effects were added. Both recordings must exist."""
     assert real_recording.reference is not None and case.reference is not None
-    given_errors = compute_prediction_error(case.recording, case.model, "test")
-    reference_errors = compute_prediction_error(case.reference, case.model, "test")
+    given_errors = compute_prediction_error(case.recording, case.first_model.model, "test")
+    reference_errors = compute_prediction_error(case.reference, case.first_model.model, "test")
     test_errors = findings.diagnosis.fit.test
     return PairOutcome(
         changed=real_recording.changed,

@@ -18,7 +18,6 @@ from analysis.evaluation.blind_test.injected_faults import InjectedOutcome, read
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
-from study.evaluation.bank.answer_cases import hash_other_recordings
 from study.evaluation.bank.ask_engine import Workers, diagnose_cases, is_answered
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
 from study.evaluation.bank.proof_folder import (
@@ -30,19 +29,13 @@ from study.evaluation.bank.proof_folder import (
     hold_proof_folder,
     open_proof_folder,
 )
-from study.evaluation.bank.proof_seals import (
-    is_answer_to_sealed_case,
-    make_broken_seal_error,
-    read_answer,
-    read_label,
-    seal,
-)
+from study.evaluation.bank.proof_seals import hash_case_files, read_label, seal
 from study.evaluation.bank.seal_cases import format_settings
+from study.evaluation.bank.sealed_bank import reveal_bank
 from study.evaluation.challenge.injection.injections import find_place, inject, list_applicable_injections
 from study.evaluation.real.diagnose_real import import_real_recording
 from study.evaluation.real.injected_halves import blank_lead_responses, compute_held_out_change, draw_halves
 from study.evaluation.real.real_folder import RealRecording
-from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import MODEL_NAME
 from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
@@ -139,9 +132,7 @@ def _write_injection(folder: ProofFolder, recordings: Sequence[InjectableRecordi
         "strength": strength if effects else 0.0,
         "values": values,
         "change": change,
-        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
-        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
-        "others_sha256": hash_other_recordings(case_folder),
+        **hash_case_files(case_folder),
         "salt": secrets.token_hex(16),
     }
     write_text(label_path, json.dumps(label_values, indent=1, allow_nan=False) + "\n")
@@ -190,12 +181,4 @@ def run_injections(
             on_done(answered_count, count)
 
         diagnose_cases(folder, case_names, workers, count_answer)
-    labels = [read_label(folder.get_label_file(number)) for number in range(len(case_names))]
-    answers = [read_answer(folder.open / name) for name in case_names]
-    if broken_names := [
-        label["name"]
-        for label, answer in zip(labels, answers, strict=True)
-        if not is_answer_to_sealed_case(label, answer)
-    ]:
-        raise make_broken_seal_error(broken_names, folder.path)
-    return tuple(read_outcome(label, answer) for label, answer in zip(labels, answers, strict=True))
+    return reveal_bank(folder, count, read_outcome)

@@ -53,20 +53,25 @@ class RealRecording:
         return (
             *self.found_map.files,
             *reference_files,
-            self.found_map.source.path,
+            *_list_map_files(self.found_map),
             *(() if model_path is None else (model_path,)),
         )
 
     @property
     def tested_on(self) -> tuple[Path, ...]:
         """Files of the recordings that are only predicted, and their maps."""
-        return tuple(path for test in self.tests for path in (*test.files, test.source.path))
+        return tuple(path for test in self.tests for path in (*test.files, *_list_map_files(test)))
 
     def _find_model_path(self) -> Path | None:
         """Find the path of the model that the map names; None where it names none. Raises StudyError for an unknown
         model."""
         model_name = self.found_map.source.map.diagnosis.model
         return find_model_path(model_name, self.folder) if model_name else None
+
+
+def _list_map_files(found_map: FoundMap) -> tuple[Path, ...]:
+    """List the file of a map; empty for a map that was made from headers, which has none."""
+    return (found_map.source.path,) if found_map.source.text else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +84,10 @@ class RealFolder:
     """Sub-folders (or the folder itself, where it has none) that could not be used, with the reason."""
 
 
-def read_real_folder(folder: Path) -> RealFolder:
+def read_real_folder(folder: Path, results_folder: Path | None = None) -> RealFolder:
     """Find the recordings of the sub-folders in alphabetical order, or of the folder itself where it has no
-    sub-folders. Names that begin with a dot are left out. Raises StudyError where there is no such folder."""
+    sub-folders. Names that begin with a dot are left out, and `results_folder`, which may lie in the folder. Raises
+    StudyError where there is no such folder."""
     if not folder.is_dir():
         raise StudyError(
             "There is no such folder",
@@ -89,7 +95,13 @@ def read_real_folder(folder: Path) -> RealFolder:
             "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
             saved="Nothing was written.",
         )
-    subfolders = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+    folder = folder.resolve()  # "." has no name
+    results_path = None if results_folder is None else results_folder.resolve()
+    subfolders = sorted(
+        path
+        for path in folder.iterdir()
+        if path.is_dir() and not path.name.startswith(".") and path.resolve() != results_path
+    )
     recordings: list[RealRecording] = []
     troubles: list[UnusableInput] = []
     for subfolder in subfolders or [folder]:
@@ -119,7 +131,20 @@ def _select_recordings(folder: Path, found_maps: Sequence[FoundMap]) -> list[Rea
         tests = tuple(candidate for candidate in found_maps if _is_test_of(candidate, found_map))
         reference, change_text = _find_reference(found_map, found_maps)
         recordings.append(RealRecording(folder, found_map, tests, reference, change_text))
+    _require_different_names(recordings)
     return recordings
+
+
+def _require_different_names(recordings: Sequence[RealRecording]) -> None:
+    """Raise StudyError where two recordings of a sub-folder have the same name, under which their results lie."""
+    names = [recording.name for recording in recordings]
+    if repeated_names := sorted({name for name in names if names.count(name) > 1}):
+        raise StudyError(
+            "Two recordings have the same name",
+            f"Several recordings have the name {', '.join(repeated_names)}: rename their files, or let the map match "
+            "only one of them.",
+            "Then run the command again.",
+        )
 
 
 def _is_test_of(test: FoundMap, base: FoundMap) -> bool:

@@ -121,7 +121,7 @@ def _list_recordings(plan: RealPlan) -> RealFolder:
             "Give a number of 1 or more, such as 180, or leave it out.",
             saved="Nothing was written.",
         )
-    real_folder = read_real_folder(plan.folder)
+    real_folder = read_real_folder(plan.folder, plan.out)
     if real_folder.recordings:
         return real_folder
     raise StudyError(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from analysis.evaluation.reproduction.document import UsedModel
 from analysis.evaluation.reproduction.measured_device import MeasuredDevice
-from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids, read_sensor_frame
+from analysis.psychophysics.ellipsoid import compute_ellipsoids, read_sensor_frame
 from analysis.psychophysics.study_analysis import analyse_study
 from equalizer.identification.frequency_response.coupling_onset import find_coupling_onset
 from equalizer.identification.frequency_response.resonances import find_resonances
@@ -106,7 +106,7 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
     """Reproduce all figures. on_progress: called with the fraction done, 0 to 1. Raises StudyError where a step fails,
     and UserInterruptError, after which the next call reuses the finished sessions, recordings and models."""
     requests = _list_requests(plan)
-    model_names = _list_model_names()
+    model_names = (CENTRE_NAME, *_list_intermediate_names(), FRICTIONLESS_NAME, HAND_NAME)
     steps = StepProgress(_estimate_step_durations_s(plan, requests, model_names), on_progress)
     saved_text = f"Sessions, recordings and models so far are in {plan.output_folder}."
     with convert_interrupts("The reproduction is not finished.", saved_text, further_types=(UserInterruptError,)):
@@ -143,11 +143,6 @@ def _list_requests(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
 def _list_intermediate_names() -> tuple[str, ...]:
     """List the names of the recordings at the intermediate places."""
     return tuple(f"between_{number}" for number in range(1, len(INTERMEDIATE_PLACES) + 1))
-
-
-def _list_model_names() -> tuple[str, ...]:
-    """List the names of the recordings from which a model is identified."""
-    return (CENTRE_NAME, *_list_intermediate_names(), FRICTIONLESS_NAME, HAND_NAME)
 
 
 def _estimate_step_durations_s(
@@ -199,7 +194,8 @@ def _collect_results(
     centre_recording = recordings[CENTRE_NAME].recording
     try:
         measured_device = _measure_device(recordings["sweep"].recording)
-        ellipsoid_results = _measure_ellipsoids(recordings["ellipsoid"].recording)
+        ellipsoid_recording = recordings["ellipsoid"].recording
+        ellipsoid_results = compute_ellipsoids(ellipsoid_recording, read_sensor_frame(ellipsoid_recording))
         frequency_response = estimate_transfer((use_excitation_as_command(centre_recording),))
     except (TransferEstimateError, ValueError) as problem:
         raise StudyError(
@@ -228,8 +224,3 @@ def _measure_device(recording: Recording) -> MeasuredDevice:
     """Estimate the frequency response of the sweep, its resonances and the onset of coupling."""
     response = estimate_transfer((recording,))
     return MeasuredDevice(response, find_resonances(response), find_coupling_onset(response))
-
-
-def _measure_ellipsoids(recording: Recording) -> tuple[EllipsoidResult, ...]:
-    """Compute the acceleration ellipsoid of each stimulus of the recording."""
-    return compute_ellipsoids(recording, read_sensor_frame(recording))

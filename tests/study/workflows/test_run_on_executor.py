@@ -6,6 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import Executor, Future
 
 import numpy as np
@@ -74,3 +75,26 @@ def test_a_killed_worker_is_an_error_that_says_what_is_kept_and_what_to_do():
         for key, _ in run_tasks(pool, killed, ((number, (number,)) for number in range(6))):
             came.append(key)
     assert sorted(came) == [0, 1, 2]
+
+
+@pytest.mark.timeout(120)
+def test_workers_end_with_the_process_that_started_them():
+    """They once finished their tasks beside those of the next run, and stayed for ever."""
+    script = (
+        "import os, time\nfrom study.workflows.worker_processes import open_worker_processes\n"
+        "if __name__ == '__main__':\n"
+        "    with open_worker_processes(1) as pool:\n"
+        "        print(pool.submit(os.getpid).result(), flush=True)\n"
+        "        pool.submit(time.sleep, 300).result()\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as calling:
+        worker = int(calling.stdout.readline())
+        calling.kill()
+    for _ in range(600):
+        try:
+            os.kill(worker, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.1)
+    os.kill(worker, signal.SIGKILL)
+    pytest.fail("the worker still runs")

@@ -15,10 +15,15 @@ from analysis.evaluation.laws.law_error import compute_law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, compute_law_score
 from study.errors import convert_interrupts
-from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
-from study.evaluation.bank.laws.seal_laws import get_fresh_motions_path, read_fresh_motions, seal_laws
-from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, hold_proof_folder, open_proof_folder
-from study.evaluation.bank.seal_cases import BankPlan, read_case_names
+from study.evaluation.bank.ask_engine import diagnose_and_count
+from study.evaluation.bank.laws.seal_laws import (
+    get_fresh_motions_path,
+    read_fresh_motions,
+    redraw_law_recording,
+    seal_laws,
+)
+from study.evaluation.bank.proof_folder import ProofFolder, hold_proof_folder, open_proof_folder
+from study.evaluation.bank.seal_cases import BankPlan, read_case_names, restore_recordings
 from study.evaluation.bank.sealed_bank import (
     BankOptions,
     Progress,
@@ -49,8 +54,7 @@ class LawBlindTest:
 
 def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawBlindTest:
     """Run a bank of laws in the folder `path`, or continue it after an interruption. Raises StudyError where the folder
-    belongs to another bank or another process works on it, a sealed file has changed, or the run is interrupted. Cases
-    without answer and recording are not diagnosed.
+    belongs to another bank or another process works on it, a sealed file has changed, or the run is interrupted.
 
     on_progress: called with the step ("sealing" or "diagnosing"), the number of finished cases, and of all cases.
     """
@@ -59,18 +63,13 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
     with convert_interrupts("The bank is not finished.", saved_text), hold_proof_folder(folder):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         case_names = read_case_names(folder, range(plan.cases))
-        diagnosable_names = [
-            name
-            for name in case_names
-            if is_answered(folder.open / name) or (folder.open / name / RECORDING_FILE).exists()
-        ]
-        diagnose_and_count(
+        restore_recordings(
             folder,
-            case_names,
-            options.diagnosis_workers,
-            partial(on_progress, "diagnosing"),
-            keep=options.keep,
-            diagnosable=diagnosable_names,
+            dict(zip(case_names, range(plan.cases), strict=True)),
+            lambda case_folder, label: redraw_law_recording(case_folder, plan, label),
+        )
+        diagnose_and_count(
+            folder, case_names, options.diagnosis_workers, partial(on_progress, "diagnosing"), keep=options.keep
         )
     outcomes = reveal_laws(folder, plan.cases)
     return LawBlindTest(

@@ -18,7 +18,14 @@ import numpy as np
 from analysis.evaluation.laws.law_error import FreshMotion
 from study.evaluation.bank.begun_cases import begin_case, publish_case
 from study.evaluation.bank.proof_folder import MODEL_FILE, RECORDING_FILE, SETTINGS_FILE, ProofFolder
-from study.evaluation.bank.seal_cases import SALT_BYTES, SEARCH_CPU_S, BankPlan, seal_missing_cases
+from study.evaluation.bank.proof_seals import hash_case_files
+from study.evaluation.bank.seal_cases import (
+    SALT_BYTES,
+    SEARCH_CPU_S,
+    BankPlan,
+    seal_missing_cases,
+    write_redrawn_recording,
+)
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.laws.draw_law import FreshTestMotion, LawCase, LawDraw, draw_law, generate_law_case
 from study.store.disk.provenance import compute_sha256
@@ -91,6 +98,12 @@ def _write_law_case(folder: ProofFolder, law_draw: LawDraw) -> None:
     publish_case(folder, case_folder)
 
 
+def redraw_law_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -> None:
+    """Draw and write the recording of a sealed case again. Raises StudyError where its hash is not the sealed one."""
+    law_case = generate_law_case(draw_law(plan.seed, label["number"], plan.brief), label["name"])
+    write_redrawn_recording(case_folder, law_case.case, label)
+
+
 def _collect_arrays(motions: Sequence[FreshTestMotion]) -> dict[str, Any]:
     """Collect the arrays of all fresh test motions by name and number, as `read_fresh_motions` reads them."""
     arrays = {}
@@ -114,8 +127,7 @@ def _make_label(folder: ProofFolder, law_draw: LawDraw, law_case: LawCase, case_
         "axes": [AXES[axis] for axis in law_draw.settings.axes],
         "truth": None if law_case.truth is None else asdict(law_case.truth),
         "adds": law_case.case.detectability,
-        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
-        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
+        **hash_case_files(case_folder),
         "fresh_sha256": compute_sha256(get_fresh_motions_path(folder, law_draw.number)),
         "salt": secrets.token_hex(SALT_BYTES),
     }

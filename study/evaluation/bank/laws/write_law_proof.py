@@ -17,16 +17,8 @@ from analysis.evaluation.blind_test.wording import format_figure
 from analysis.evaluation.laws.law_outcome import LawOutcome
 from equalizer.laws.law import Law
 from study.evaluation.bank.laws.prove_laws import LawBlindTest
-from study.evaluation.bank.write_proof import FigureRow, read_current_commit
-from study.store.disk.csv_rows import format_csv_table
-from study.store.disk.json_document import write_json
-from study.store.disk.provenance import anonymise_arguments, gather_provenance
-from study.store.disk.text_file import write_text
-
-FORMAT, VERSION = "hapteq-proof", 1
-"""Name and version of the format of `proof.json`."""
-DOCUMENT_FILE, TABLE_FILE = "proof.json", "proof.csv"
-"""Names of the files in the folder of the test."""
+from study.evaluation.bank.write_proof import format_code_line, read_answering_commit, write_document, write_figures
+from study.store.disk.provenance import anonymise_arguments
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,29 +68,23 @@ def write_law_proof(result: LawBlindTest) -> None:
     one cannot be written."""
     document = {
         **_collect_shared_fields(result),
-        "commit": read_current_commit(),
+        "commit": read_answering_commit(result.folder.path, result.engines),
         "command": " ".join(anonymise_arguments(sys.argv)),
     }
-    write_json(result.folder.path / DOCUMENT_FILE, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
-    rows = [_make_row(outcome) for outcome in result.outcomes]
-    write_text(result.folder.path / TABLE_FILE, format_csv_table(rows, LawRow), overwrite=True)
+    write_document(result.folder.path, document, [_make_row(outcome) for outcome in result.outcomes], LawRow)
 
 
 def write_law_table(path: Path, result: LawBlindTest) -> None:
     """Write the figures as a CSV table at `path`, and the misses as a second one, whose name ends in -misses. Raises
     StudyError where one cannot be written."""
-    figures = [
-        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in result.score.figures
-    ]
     header_lines = [
         f"# {len(result.outcomes)} cases of laws, seeds {result.plan.seed} to "
         f"{result.plan.seed + result.plan.cases - 1}",
-        f"# commit {read_current_commit()}, code of the diagnosis {' '.join(result.engines)}",
+        format_code_line(result.folder.path, result.engines),
         f"# seal of the labels {result.seal}",
     ]
-    write_text(path, "\n".join(header_lines) + "\n" + format_csv_table(figures, FigureRow), overwrite=True)
     misses = [_make_row(miss) for miss in result.score.misses]
-    write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), format_csv_table(misses, LawRow), overwrite=True)
+    write_figures(path, header_lines, result.score.figures, misses, LawRow)
 
 
 def format_law_lines(result: LawBlindTest) -> Iterator[str]:

@@ -1,5 +1,7 @@
 """Figures of a proof from outcomes that are written by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -114,6 +116,12 @@ def test_every_answer_that_is_not_as_it_should_be_is_listed():
     assert {id(miss) for miss in compute_score(ALL).misses} == {
         id(o) for o in (WRONG, IN_SET, GUESSED, ALARM, TAKEN_IN, PARTLY, PAIR, BROKEN)
     }
+
+
+def test_a_channel_of_unknown_error_hides_no_other():
+    for errors in ({"x": float("nan"), "ax": 5.0}, {"ax": 5.0, "x": float("nan")}):
+        case = replace(UNSEEN, channel_errors={"retuned": errors})
+        assert (case.compute_worst_error("retuned"), case.detectable, is_wrong_answer(case)) == (5.0, True, True)
 
 
 def test_what_cannot_be_seen_is_no_miss_and_what_broke_down_is_one():

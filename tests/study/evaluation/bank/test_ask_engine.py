@@ -5,8 +5,11 @@ import sys
 
 import pytest
 
-from study.evaluation.bank.ask_engine import MAX_ATTEMPTS, DiagnosisProcess
-from study.evaluation.bank.proof_folder import ProofFolder
+from study.errors import StudyError
+from study.evaluation.bank import ask_engine
+from study.evaluation.bank.ask_engine import MAX_ATTEMPTS, DiagnosisProcess, diagnose_cases
+from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder
+from study.store.disk.file_errors import CannotWriteError
 
 DYING = "import os, sys, time; sys.stdin.readline(); os.close(1); time.sleep(60)"
 """Has closed its pipe, as a killed process does at once, and is not gone yet."""
@@ -54,3 +57,28 @@ def test_a_case_that_kills_every_process_is_given_up(engine):
     asked = engine(DYING)
     assert not any(asked.request_answer("a") for _ in range(MAX_ATTEMPTS))
     assert len(asked.started) == MAX_ATTEMPTS
+
+
+@pytest.mark.timeout(60)
+def test_a_failure_that_cannot_be_written_is_told_with_its_cause(engine, tmp_path, monkeypatch):
+    """It once ended its thread, with a traceback and an error that did not say that the disk is full."""
+
+    def refuse(path, text, overwrite):
+        raise CannotWriteError(path, OSError(28, "No space left on device"))
+
+    monkeypatch.setattr(ask_engine, "DiagnosisProcess", lambda folder: engine(DYING))
+    monkeypatch.setattr(ask_engine, "write_text", refuse)
+    for name in "ab":
+        (tmp_path / "open" / name).mkdir(parents=True)
+        (tmp_path / "open" / name / RECORDING_FILE).touch()
+    with pytest.raises(CannotWriteError, match="The disk is full"):
+        diagnose_cases(ProofFolder(tmp_path), ["a", "b"], 2, lambda name: None)
+
+
+def test_a_case_without_answer_and_recording_is_told_and_not_counted_as_failed(tmp_path):
+    """As of a follow-up or a control whose answer was removed."""
+    (tmp_path / "open" / "a").mkdir(parents=True)
+    with pytest.raises(StudyError, match=r"no recording\.h5 of a\.") as told:
+        diagnose_cases(ProofFolder(tmp_path), ["a"], 1, lambda name: None)
+    assert told.value.do_now.startswith(f"Delete the folder {tmp_path}")
+    assert not (tmp_path / "open" / "a" / "answer.json").exists()

@@ -39,6 +39,24 @@ def test_a_table_of_something_else_is_refused(tmp_path: Path) -> None:
     assert refusal.value.do_now.startswith("Correct it before it is sealed")
 
 
+@pytest.mark.parametrize("name", ["../x", "./rec_01", "rec_01/", "/tmp/rec_01", "..", "", "rec_01 ", "a\\b"])
+def test_a_recording_whose_name_is_a_path_is_not_sealed(tmp_path: Path, name: str) -> None:
+    """Two spellings of one folder would count its diagnosis twice."""
+    table = tmp_path / "labels.csv"
+    table.write_text(f"recording,change,value,note,salt\nrec_01,nothing,,,a\n{name},nothing,,,b\n")
+    with pytest.raises(StudyError, match="is no name of a recording"):
+        seal_labels(table)
+    assert not (tmp_path / "labels.csv.sha256").exists()
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999"])
+def test_a_value_that_is_not_finite_is_not_sealed(tmp_path: Path, value: str) -> None:
+    table = tmp_path / "labels.csv"
+    table.write_text(f"recording,change,value,note,salt\nrec_01,added_mass,{value},,a\n")
+    with pytest.raises(StudyError, match="no finite number"):
+        seal_labels(table)
+
+
 def test_a_table_with_its_seal_keeps_it(tmp_path: Path) -> None:
     table = tmp_path / "labels.csv"
     draw_labels(table, 1, seed=3)

@@ -94,6 +94,17 @@ def test_a_value_of_a_change_without_a_unit_is_compared_with_no_interval(tmp_pat
     assert score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0].inside is None
 
 
+@pytest.mark.parametrize(("value", "inside"), [(0.0002, True), (0.002, False)])
+def test_a_play_is_compared_with_the_interval_of_the_effect_that_was_named(
+    tmp_path: Path, value: float, inside: bool
+) -> None:
+    table = labels_in(tmp_path, "recording,change,value,note,salt\nrec_01,loosened_cable,0.0002,,a\n")
+    seal_labels(table)
+    said = {"rec_01": diagnosis("loose_joint", value=value)}
+    row = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0]
+    assert (row.right, row.inside) == (True, inside)
+
+
 def test_a_value_is_not_compared_with_an_interval_in_another_unit(tmp_path: Path) -> None:
     """On a rotating device an added mass is a moment of inertia."""
     table = labels_in(tmp_path)

@@ -15,7 +15,8 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import open_proof_folder
-from study.evaluation.real.inject_real import PROCESSOR_S, InjectableRecording, seal_injections
+from study.evaluation.bank.proof_seals import hash_case_files
+from study.evaluation.real.inject_real import PROCESSOR_S, InjectableRecording, run_injections, seal_injections
 from study.evaluation.real.injected_halves import blank_lead_responses, compute_held_out_change, draw_halves
 from study.store.disk.provenance import compute_sha256
 from study.store.formats.recording_file import read_recording
@@ -151,3 +152,16 @@ def test_a_label_that_was_changed_breaks_its_seal(carrier, tmp_path: Path):
     folder.get_label_file(0).write_text(folder.get_label_file(0).read_text().replace('"strength"', '"strength" '))
     with pytest.raises(StudyError, match="A seal is broken"):
         seal_injections(folder, (carrier,), 1, 4)
+
+
+def test_a_label_that_is_changed_during_the_diagnoses_breaks_its_seal(carrier, tmp_path: Path, monkeypatch):
+    def answer_and_change(folder, names, workers, on_answered):
+        for name in names:
+            answer = {"failed": "", "knows_the_challenge": False, **hash_case_files(folder.open / name)}
+            (folder.open / name / "answer.json").write_text(json.dumps(answer))
+        path = folder.get_label_file(0)
+        path.write_text(path.read_text().replace('"strength"', '"strength" '))
+
+    monkeypatch.setattr("study.evaluation.real.inject_real.diagnose_cases", answer_and_change)
+    with pytest.raises(StudyError, match="A seal is broken"):
+        run_injections(tmp_path / "bank", (carrier,), (1, 4), lambda done, of: None)

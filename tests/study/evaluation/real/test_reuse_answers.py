@@ -169,3 +169,34 @@ def test_seconds_that_are_no_number_are_wrong_use(folder: Path, tmp_path: Path, 
         diagnose_folder(RealPlan(folder, tmp_path / "out", seconds), silent)
     assert refused.value.exit_code == 2
     assert not (tmp_path / "out").exists()
+
+
+def test_results_in_the_folder_of_the_recordings_are_no_recordings(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder itself is taken where it has no other sub-folders, by its name even where it is given as "."."""
+    monkeypatch.chdir(folder / "axis")
+    plan = RealPlan(Path(), Path("results"))
+    for _ in range(2):
+        done = diagnose_folder(plan, silent)
+        assert (len(done.results.answers), done.results.troubles) == (1, ())
+    assert (folder / "axis" / "results" / "axis" / "run" / "answer.json").is_file()
+
+
+def test_recordings_of_the_same_name_are_reported_before_any_is_diagnosed(folder: Path) -> None:
+    """Their results would lie in one folder: each run would find those of the other."""
+    (folder / "axis" / "run.csv").write_text("no table")
+    (folder / "axis" / "run.toml").write_text(MAP.replace('files = ["run.npz"]', 'files = ["run.*"]\nseparate = true'))
+    assert "separate = true" in (folder / "axis" / "run.toml").read_text()
+    read = read_real_folder(folder)
+    assert read.recordings == ()
+    assert "Several recordings have the name run_run" in read.troubles[0].reason
+
+
+def test_a_recording_whose_header_is_its_map_is_answered(tmp_path: Path) -> None:
+    (tmp_path / "recordings" / "rig").mkdir(parents=True)
+    rows = "".join(f"{0.001 * row},{row % 3},{row % 2}\n" for row in range(9))
+    (tmp_path / "recordings" / "rig" / "data.csv").write_text(f"time [s],force fx [N],position x [m]\n{rows}")
+    for _ in range(2):
+        (answer,) = diagnose_folder(RealPlan(tmp_path / "recordings", tmp_path / "out"), silent).results.answers
+        assert (answer.recording, answer.verdict) == ("rig", "refused")

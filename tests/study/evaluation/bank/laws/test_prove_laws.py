@@ -1,17 +1,21 @@
 """A bank of laws from start to end: sealed with a fresh motion, answered apart with the search for laws, revealed."""
 
 import json
+import shutil
 
 import pytest
 
+from analysis.evaluation.laws.law_score import compute_law_score
 from study.errors import StudyError
-from study.evaluation.bank.laws.prove_laws import prove_laws, reveal_laws
+from study.evaluation.bank.laws import prove_laws as prove_laws_module
+from study.evaluation.bank.laws.prove_laws import LawBlindTest, prove_laws, reveal_laws
 from study.evaluation.bank.laws.seal_laws import get_fresh_motions_path, read_fresh_motions, seal_laws
 from study.evaluation.bank.laws.write_law_proof import format_law_lines, write_law_proof
-from study.evaluation.bank.proof_folder import SETTINGS_FILE, open_proof_folder
+from study.evaluation.bank.proof_folder import RECORDING_FILE, SETTINGS_FILE, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan
 from study.evaluation.bank.sealed_bank import BankOptions
+from study.store.disk.provenance import compute_sha256
 
 SEED = 30_313
 """Its first device has a law."""
@@ -52,6 +56,24 @@ def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
     get_fresh_motions_path(copy, 0).write_bytes(b"other")
     with pytest.raises(StudyError, match="seal"):
         reveal_laws(copy, 1)
+
+
+def test_a_case_without_answer_and_recording_is_drawn_again_and_not_left_out(sealed, tmp_path, monkeypatch):
+    copy = tmp_path / "copy"
+    shutil.copytree(sealed.path, copy)
+    (place,) = (copy / "open").iterdir()
+    (place / RECORDING_FILE).unlink()
+    asked = []
+    monkeypatch.setattr(prove_laws_module, "diagnose_and_count", lambda folder, names, *_, keep: asked.extend(names))
+    prove_laws(copy, BankPlan(SEED, 1, brief=True), BankOptions(), lambda what, done, of: None)
+    assert asked == [place.name]
+    assert compute_sha256(place / RECORDING_FILE) == read_label(sealed.get_label_file(0))["recording_sha256"]
+
+
+def test_the_commit_is_that_of_the_code_that_answered(tmp_path):
+    done = LawBlindTest(ProofFolder(tmp_path), BankPlan(SEED, 1), "", (), compute_law_score(()), ("another",))
+    write_law_proof(done)
+    assert json.loads((tmp_path / "proof.json").read_text())["commit"] == "unknown: the code has changed since"
 
 
 def test_a_folder_of_effects_is_no_folder_of_laws(sealed):
