@@ -87,7 +87,8 @@ def _make_units_pictures(analysis: StudyAnalysis) -> list[Picture]:
             "with an arrow are cut by the cap: medians over them are too low. Acceleration and displacement are what "
             f"was measured along the direction in {select_threshold_words(analysis.protocol.staircase).measured_in}."
             + (
-                " Above detection: over the level from which the same participant felt the vibration at all."
+                " Above detection: over the level from which the same participant felt the vibration at all, where the "
+                "cap did not cut that level."
                 if tables[-1].quantity == "above_detection_db"
                 else ""
             ),

@@ -55,37 +55,18 @@ def compute_detection_thresholds(trials: Iterable[Trial], protocol: StudyProtoco
 
 def compute_thresholds_above_detection(direction: ThresholdTable, detection: ThresholdTable) -> ThresholdTable:
     """Express direction thresholds in dB above the detection threshold of the same participant and frequency; None
-    where either is missing. Both tables in newtons. A value is censored where either threshold is."""
-    rows_db, censored = [], []
-    for subject, row, censored_flags in zip(direction.subjects, direction.values, direction.censored, strict=True):
-        detection_cells = [
-            _look_up_detection_threshold(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz
-        ]
+    where either is missing, or the detection threshold is censored, so that the value could only be too high. Both
+    tables in newtons. A value is censored where the direction threshold is."""
+    rows_db = []
+    for subject, row in zip(direction.subjects, direction.values, strict=True):
+        detection_cells = [detection.look_up(subject, frequency_hz) for frequency_hz in direction.frequencies_hz]
         rows_db.append(
             tuple(
-                None if threshold is None or detection_n is None else to_db(threshold) - to_db(detection_n)
-                for threshold, (detection_n, _) in zip(row, detection_cells, strict=True)
+                None if threshold is None or detection_n is None or is_cut else to_db(threshold) - to_db(detection_n)
+                for threshold, (detection_n, is_cut) in zip(row, detection_cells, strict=True)
             )
         )
-        censored.append(
-            tuple(
-                is_direction_censored or is_detection_censored
-                for is_direction_censored, (_, is_detection_censored) in zip(
-                    censored_flags, detection_cells, strict=True
-                )
-            )
-        )
-    return replace(direction, quantity="above_detection_db", values=tuple(rows_db), censored=tuple(censored), notes=())
-
-
-def _look_up_detection_threshold(
-    detection: ThresholdTable, subject: str, frequency_hz: float
-) -> tuple[float | None, bool]:
-    """Look up a detection threshold (N; None where missing), and whether it is censored."""
-    if subject not in detection.subjects or frequency_hz not in detection.frequencies_hz:
-        return None, False
-    row, column = detection.subjects.index(subject), detection.frequencies_hz.index(frequency_hz)
-    return detection.values[row][column], detection.censored[row][column]
+    return replace(direction, quantity="above_detection_db", values=tuple(rows_db), notes=())
 
 
 def find_thresholds_below_detection(

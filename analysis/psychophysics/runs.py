@@ -64,8 +64,9 @@ def recompute_runs(
     follow no staircase: a caller who passes TRAINING must leave them out of `trials` (see `study_analysis`).
 
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
-    answers before it lead to, or lies outside its roving range, a run has two frequencies, an answer has no `correct`,
-    a catch trial was not played at the cap, or a row between others is missing, or one is doubled or too many.
+    answers before it lead to, or lies outside its roving range, a run has two frequencies, `correct` does not follow
+    from an answer, a catch trial was not played at the cap, or a row between others is missing, or one is doubled or
+    too many.
     """
     phases = {phase, Phase.CATCH} if phase is Phase.TEST else {phase}
     trials_by_run: dict[tuple[str, str, int], list[Trial]] = {}
@@ -98,8 +99,8 @@ def _recompute_run(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Ru
 
 def _replay_answers(valid_trials: tuple[Trial, ...], rule: StaircaseRule, rove_db: float) -> StaircaseState:
     """Replay the rule with all valid answers, and compare each level with that of the rule. Returns the last state.
-    Raises InconsistentTrialsError for another level, an answer after the end of the run, or an answer with `correct`
-    None."""
+    Raises InconsistentTrialsError for another level, an answer after the end of the run, or a `correct` that does not
+    follow from the answer."""
     state = begin_staircase(rule)
     for trial in valid_trials:
         if is_finished(rule, state):
@@ -109,6 +110,11 @@ def _replay_answers(valid_trials: tuple[Trial, ...], rule: StaircaseRule, rove_d
             )
         if trial.correct is None:
             raise InconsistentTrialsError(f"{_describe_trial(trial)}: there is an answer, but correct is empty")
+        if bool(trial.correct) != (trial.answer == trial.direction_shown):
+            raise InconsistentTrialsError(
+                f"{_describe_trial(trial)}: correct is {bool(trial.correct)}, but {trial.direction_shown} was shown "
+                f"and {trial.answer} answered; the row was changed"
+            )
         if trial.phase is Phase.CATCH:
             _refuse_weak_catch_trial(trial, rule)
             continue

@@ -153,20 +153,20 @@ def _format_mean(thresholds_n: Sequence[float | None]) -> str:
     return f"mean threshold {sum(known_n) / len(known_n):.3g} N of {len(known_n)}" if known_n else "no threshold"
 
 
-def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Sequence[str] = ()) -> StudyAnalysis:
+def analyse_study(trials: Iterable[Trial], protocol: StudyProtocol, left_out: Sequence[str] = ()) -> StudyAnalysis:
     """Compute thresholds, statistics and warnings from trials of one population under one protocol.
 
     left_out: sessions and trials that are not among these, with the reason, in sentences; listed in `declared_result`.
     Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
     with `split_by_population` first), and InconsistentTrialsError where they contradict the protocol's staircase.
     """
-    population, rule = _find_single_population(trials), protocol.staircase
-    runs = recompute_runs(trials, rule, rove_db=protocol.stimulus.rove_db)
+    trials, rule = tuple(trials), protocol.staircase
+    population, runs = _find_single_population(trials), recompute_runs(trials, rule, rove_db=protocol.stimulus.rove_db)
     thresholds = tuple(compute_run_threshold(run, rule) for run in runs)
     test_trials = tuple(trial for trial in trials if trial.phase is Phase.TEST)
     table = tabulate_thresholds(thresholds, protocol.stimulus.frequencies_hz)
     detection, catches = compute_detection_thresholds(trials, protocol), tally_catch_trials(trials)
-    detection_table = tabulate_thresholds(detection, protocol.detection.frequencies_hz)
+    detection_table = tabulate_thresholds(detection, protocol.detection.frequencies_hz, is_detection=True)
     anova, repeated_measures = (
         compute_one_way_anova(table.group_by_frequency()), analyse_repeated_measures(table.subjects, table.values),
     )  # fmt: skip

@@ -41,6 +41,13 @@ class ThresholdTable:
             for frequency_hz, column in zip(self.frequencies_hz, columns, strict=True)
         }
 
+    def look_up(self, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
+        """Look up a threshold (None where missing), and whether it is censored."""
+        if subject not in self.subjects or frequency_hz not in self.frequencies_hz:
+            return None, False
+        row, column = self.subjects.index(subject), self.frequencies_hz.index(frequency_hz)
+        return self.values[row][column], self.censored[row][column]
+
     @property
     def censored_count(self) -> int:
         """Number of thresholds into which the cap cut (censored)."""
@@ -79,13 +86,17 @@ class ThresholdTable:
 
 
 def tabulate_thresholds(
-    rows: Sequence[Threshold], frequencies_hz: Sequence[float], quantity: Quantity = "threshold_n"
+    rows: Sequence[Threshold],
+    frequencies_hz: Sequence[float],
+    quantity: Quantity = "threshold_n",
+    is_detection: bool = False,
 ) -> ThresholdTable:
     """Tabulate the first completed run of each participant at each of the frequencies.
 
     The first, because a run repeated after its result was seen must not replace it; later ones are named in the notes,
     and so are runs at further frequencies. Frequencies ascend; participants are in the order of their first row; those
-    without any completed run have a row of gaps.
+    without any completed run have a row of gaps. is_detection: whether these are detection runs, whose answers enter no
+    model.
     """
     subjects = tuple(dict.fromkeys(row.subject for row in rows))
     first_runs: dict[tuple[str, float], Threshold] = {}
@@ -96,11 +107,7 @@ def tabulate_thresholds(
         if row.frequency_hz not in frequencies_hz:
             notes.append(f"{row.subject} has a run at {row.frequency_hz:g} Hz, which the protocol does not name.")
         elif row.complete and cell in first_runs:
-            notes.append(
-                f"{row.subject} completed more than one run at {row.frequency_hz:g} Hz; the threshold is that of the "
-                f"first (session {first_runs[cell].session}), not of run {row.run} of session {row.session}. A model "
-                "of all answers takes the answers of both."
-            )
+            notes.append(_describe_repeated_run(first_runs[cell], row, is_detection))
         elif row.complete:
             first_runs[cell] = row
     ordered_hz = tuple(sorted(frequencies_hz))
@@ -121,6 +128,17 @@ def tabulate_thresholds(
             for subject in subjects
         ),
         notes=tuple(notes),
+    )
+
+
+def _describe_repeated_run(first: Threshold, repeated: Threshold, is_detection: bool) -> str:
+    """Describe which of two completed runs of a participant at the same frequency gives the threshold."""
+    run_noun, model_note = (
+        ("detection run", "") if is_detection else ("run", " A model of all answers takes the answers of both.")
+    )
+    return (
+        f"{first.subject} completed more than one {run_noun} at {first.frequency_hz:g} Hz; the threshold is that of "
+        f"the first (session {first.session}), not of run {repeated.run} of session {repeated.session}.{model_note}"
     )
 
 

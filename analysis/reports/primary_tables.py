@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+from analysis.psychophysics.declared_result import NOT_CONVERGED_NOTE
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.likelihood_thresholds import LikelihoodThreshold, convert_to_newton
@@ -115,7 +116,6 @@ def _describe_fit(primary: PrimaryAnalysis) -> str:
         f"Median slope {format_number(primary.slope)} ({primary.family.value}), lapse rate "
         f"{format_number(100 * primary.lapse, 1)} %, response bias "
         f"{format_number(primary.criterion_sd)} (standard deviation, in units of d')."
-        + ("" if primary.converged else " The fit did not converge: do not use these numbers.")
         + describe_undetermined(primary)
         + describe_far_above(primary)
     )
@@ -131,8 +131,9 @@ def describe_far_above(primary: PrimaryAnalysis) -> str:
 
 
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
-    """Describe the standard deviations between persons whose search ended at its upper bound: sentences with a leading
-    space; empty without any."""
+    """Describe that the fit did not converge, and the standard deviations between persons whose search ended at its
+    upper bound: sentences with a leading space; empty without either."""
+    convergence_text = "" if primary.converged else f" {NOT_CONVERGED_NOTE}"
     sds = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
     quantity_names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
     undetermined = [
@@ -141,10 +142,10 @@ def describe_undetermined(primary: PrimaryAnalysis) -> str:
         if math.log(sd) > upper_bound - BOUND_TOLERANCE_LOG
     ]
     if not undetermined:
-        return ""
+        return convergence_text
     return (
-        f" The answers do not determine how much people differ in their {conjoin(undetermined)}: the search ended at "
-        "its bound. Do not use the median slope, nor single curves."
+        f"{convergence_text} The answers do not determine how much people differ in their {conjoin(undetermined)}: the "
+        "search ended at its bound. Do not use the median slope, nor single curves."
     )
 
 

@@ -176,19 +176,10 @@ def _format_detection_cells(
 ) -> Iterator[str]:
     """Format the cells of detection threshold, direction threshold and their ratio in dB; the ratio is `MISSING` where
     either is missing or cut. detection_n: detection threshold (N), None = missing."""
-    direction_n, is_direction_cut = _find_direction_threshold(analysis, subject, frequency_hz)
+    direction_n, is_direction_cut = analysis.table.look_up(subject, frequency_hz)
     yield mark_cut(detection_n, is_detection_cut)
     yield mark_cut(direction_n, is_direction_cut)
     if detection_n is None or direction_n is None or is_detection_cut or is_direction_cut:
         yield MISSING
     else:
         yield format_signed(to_db(direction_n) - to_db(detection_n), 1)
-
-
-def _find_direction_threshold(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
-    """Find the direction threshold (N) of a participant at a frequency, and whether it is cut; None where missing."""
-    thresholds = analysis.table
-    if subject not in thresholds.subjects or frequency_hz not in thresholds.frequencies_hz:
-        return None, False
-    row, column = thresholds.subjects.index(subject), thresholds.frequencies_hz.index(frequency_hz)
-    return thresholds.values[row][column], thresholds.censored[row][column]

@@ -40,6 +40,10 @@ LOG_SD_BOUNDS = ((-5.0, 3.5), (-5.0, 3.5), (-5.0, 0.7), (-5.0, 1.1))
 """Bounds of the log standard deviations, in the order of `ParameterLayout.log_sds`: 0.007 to 33 dB, up to 2 in
 log-slopes, up to 3 in d'. At the lower bound persons are alike; at the upper bound they have practically nothing in
 common."""
+LOG_SLOPE_BOUNDS = (-5.0, 7.0)
+"""Bounds of the mean log-slope: slopes of 0.007, practically constant over all levels, to 1100, practically a step.
+Answers that are all right above some level and all wrong below it do not bound it, and the derivatives of far steeper
+curves overflow. Chosen."""
 LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))
 """Bounds of the lapse rate (logit): 0.01 % to 30 %."""
 
@@ -93,7 +97,7 @@ class Objective:
         bounds: list[tuple[float | None, float | None]] = [(None, None)] * self.layout.size
         for index, limits in zip(self.layout.log_sds, LOG_SD_BOUNDS, strict=True):
             bounds[index] = limits
-        bounds[self.layout.lapse] = LAPSE_BOUNDS
+        bounds[self.layout.slope], bounds[self.layout.lapse] = LOG_SLOPE_BOUNDS, LAPSE_BOUNDS
         return bounds
 
 

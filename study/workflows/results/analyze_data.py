@@ -15,7 +15,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, make_anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import describe_declared
-from analysis.reports.primary_tables import describe_direction_limit, format_median_interval
+from analysis.reports.primary_tables import describe_direction_limit, describe_undetermined, format_median_interval
 from analysis.reports.study_report import render_study_report
 from analysis.wording import format_newtons
 from study.errors import StudyError, WrongUseError
@@ -116,8 +116,8 @@ def _format_frequency_lines(table: ThresholdTable, heading: str) -> list[str]:
 
 
 def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
-    """Format lines on the medians (N) of the hierarchical model with their 95 % intervals, on the direction limit and
-    on the comparison of the analyses; empty where it was not fitted."""
+    """Format lines on the medians (N) of the hierarchical model with their 95 % intervals, on what its fit does not
+    determine, on the direction limit and on the comparison of the analyses; empty where it was not fitted."""
     if analysis.primary is None:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]
@@ -129,6 +129,7 @@ def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
             format_median_interval(median.lower_n, median.upper_n, median.above_cap, format_limit) + unit_text
         )
         lines.append(f"{median.frequency_hz:7g} Hz  {median_text:>10}  {interval_text}")
+    lines += filter(None, [describe_undetermined(analysis.primary).strip()])
     return [*lines, describe_direction_limit(analysis.primary), analysis.comparison_text]
 
 

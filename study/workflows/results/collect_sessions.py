@@ -22,12 +22,15 @@ from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import finish_tables
 
+HASH_DIGITS = 12
+"""Number of digits of a protocol's hash that are shown, and that select a protocol."""
+
 
 def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedTrials:
     """Collect the sessions in `data` (or `data` itself, a session) that belong together. Of several protocols (with
-    protocol_name, its name or the first 12 digits of its hash, only those): one with test or detection runs, if any,
-    then the one with the most sessions. Of several populations: the first in the order of `Population`. Missing or
-    outdated tables and seals of usable closed sessions are written (`_finish_result_files`). Raises StudyError where
+    protocol_name, its name or the first `HASH_DIGITS` digits of its hash, only those): one with test or detection runs,
+    if any, then the one with the most sessions. Of several populations: the first in the order of `Population`. Missing
+    or outdated tables and seals of usable closed sessions are written (`_finish_result_files`). Raises StudyError where
     there is nothing to analyse."""
     folders = _list_folders(data)
     usable_sessions, exclusions = _fold_sessions(folders)
@@ -35,7 +38,7 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
     chosen_hash = _choose_protocol(session_states, protocol_name, data)
     chosen_sessions = [(folder, state) for folder, state in session_states if state.opened.protocol_hash == chosen_hash]
     exclusions += [
-        f"{folder.name} follows another protocol ('{state.protocol.name}')."
+        f"{folder.name} follows another protocol, {_name_protocol(state)}."
         for folder, state in session_states
         if state.opened.protocol_hash != chosen_hash
     ]
@@ -171,12 +174,10 @@ def _choose_protocol(
     candidates = {
         protocol_hash: states
         for protocol_hash, states in states_by_hash.items()
-        if protocol_name in (None, states[0].protocol.name, protocol_hash[:12])
+        if protocol_name in (None, states[0].protocol.name, protocol_hash[:HASH_DIGITS])
     }
     if not candidates:
-        available_text = ", ".join(
-            f"{states[0].protocol.name} ({protocol_hash[:12]})" for protocol_hash, states in states_by_hash.items()
-        )
+        available_text = ", ".join(_name_protocol(states[0]) for states in states_by_hash.values())
         raise WrongUseError(
             "No session follows that protocol",
             f"'{protocol_name}' was asked for; {data} holds sessions of {available_text}.",
@@ -190,6 +191,12 @@ def _choose_protocol(
             len(candidates[protocol_hash]),
         ),
     )
+
+
+def _name_protocol(state: SessionState) -> str:
+    """Name the protocol of a session, with the digits of its hash by which it can be chosen: a changed protocol may
+    have kept its name."""
+    return f"{state.protocol.name} ({state.opened.protocol_hash[:HASH_DIGITS]})"
 
 
 def _has_measured_runs(protocol: StudyProtocol) -> bool:

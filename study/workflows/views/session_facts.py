@@ -8,11 +8,8 @@ from study.session.facts.events import FormFilled, SessionClosed, SessionOpened,
 from study.session.facts.void_reasons import is_computer_busy
 from study.session.state.state import SessionState
 from study.session.views.local_time import Zone, format_time_in_zone
+from study.workflows.results.collect_sessions import HASH_DIGITS
 from study.workflows.results.fold_session import FoldedSession
-
-_HASH_DIGITS = 12
-"""Number of digits of the protocol's hash that are shown: as many as select a protocol in
-`collect_sessions`."""
 
 
 def list_session_facts(folded_session: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
@@ -25,7 +22,7 @@ def list_session_facts(folded_session: FoldedSession, zone: Zone) -> tuple[tuple
     time_remark = ", in simulated time, which runs ahead of the clock" if session_opened.observer else ""
     facts = [
         ("participant", f"{session_opened.subject}, {participant_text}, {_describe_number(state)}"),
-        ("protocol", f"{state.protocol.name} ({session_opened.protocol_hash[:_HASH_DIGITS]}, {lock_text})"),
+        ("protocol", f"{state.protocol.name} ({session_opened.protocol_hash[:HASH_DIGITS]}, {lock_text})"),
         ("title", state.protocol.title),
         ("device", _describe_device(session_opened)),
         ("equalizer", session_opened.equalizer),

@@ -105,6 +105,8 @@ def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(all_tria
     assert row[:3] == (None, None, None) and row[4] is None
     assert row[3] == pytest.approx(20 * np.log10(analysis.table.values[0][3] / felt))
     assert table.censored[0][3] == analysis.table.censored[0][3]
+    cut = replace(analysis.detection_table, censored=((True,),) * len(analysis.detection_table.subjects))
+    assert compute_thresholds_above_detection(analysis.table, cut).values[0][3] is None  # it would be too high
     assert "units" in [picture.name for picture in draw_study_pictures(analysis)]
 
 

@@ -53,7 +53,7 @@ def test_a_changed_level_is_named(rows, rule, level):
 
 def test_a_changed_answer_is_found_by_a_later_level(rows, rule):
     first_wrong = next(i for i, row in enumerate(rows) if not row.correct)
-    rows[first_wrong] = replace(rows[first_wrong], correct=True)
+    rows[first_wrong] = replace(rows[first_wrong], correct=True, answer=rows[first_wrong].direction_shown)
     with pytest.raises(InconsistentTrialsError, match="or were changed"):
         recompute_runs(rows, rule)
 
@@ -152,3 +152,9 @@ def test_a_level_that_roving_cannot_have_drawn_is_refused(rows, rule, rove_db, o
     else:
         with pytest.raises(InconsistentTrialsError, match="level_n is .* around a nominal_n of"):
             recompute_runs(drawn, rule, rove_db=rove_db)
+
+
+def test_an_answer_that_is_not_what_its_verdict_says_is_refused(rows, rule):
+    rows[2] = replace(rows[2], direction_shown=3 - rows[2].direction_shown)
+    with pytest.raises(InconsistentTrialsError, match=r"trial 3: correct is \w+, but . was shown and . answered"):
+        recompute_runs(rows, rule)

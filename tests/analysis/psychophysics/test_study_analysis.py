@@ -111,3 +111,8 @@ def test_two_kinds_of_participants_are_refused(simulate_study, protocol):
 def test_the_order_of_the_rows_does_not_matter_within_a_study(simulate_study, protocol):
     trials = simulate_study(subjects=2)
     assert analyse_study(trials[::-1], protocol).anova.f == pytest.approx(analyse_study(trials, protocol).anova.f)
+
+
+def test_trials_may_come_from_a_generator(simulate, protocol):
+    rows = simulate(1.0, np.random.default_rng(3))
+    assert analyse_study((row for row in rows), protocol).runs == analyse_study(rows, protocol).runs

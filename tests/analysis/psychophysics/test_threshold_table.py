@@ -42,6 +42,11 @@ def test_the_first_completed_run_counts_and_the_second_is_named(rows):
     )
 
 
+def test_answers_of_a_second_detection_run_enter_no_model(rows):
+    (note,) = tabulate_thresholds([*rows, replace(rows[0], session="2", run=1)], FREQUENCIES, is_detection=True).notes
+    assert "completed more than one detection run at" in note and "model" not in note
+
+
 def test_a_frequency_of_another_protocol_is_named(rows):
     table = tabulate_thresholds([replace(rows[0], frequency_hz=80.0)], FREQUENCIES)
     assert table.notes == ("s01 has a run at 80 Hz, which the protocol does not name.",)

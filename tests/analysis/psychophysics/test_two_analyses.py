@@ -8,6 +8,7 @@ import pytest
 
 from analysis.psychophysics.coverage.coverage_words import describe_coverage
 from analysis.psychophysics.coverage.measured_coverage import MEASURED_COVERAGES
+from analysis.psychophysics.declared_result import NOT_CONVERGED_NOTE
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.psychophysics.two_analyses import SIMULATED_RULE, describe_comparison, describe_declaration
@@ -53,6 +54,16 @@ def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analy
     ):
         assert "no lower bound" in shown(unbounded)
         assert "no lower bound" not in shown(analysis)
+
+
+def test_a_fit_that_did_not_converge_is_reported_on_the_page_and_in_the_terminal(analysis):
+    unusable = replace(analysis, primary=replace(analysis.primary, converged=False))
+    for shown in (
+        lambda a: render_study_report(a, (), {}, "2026-01-02T03:04:05Z"),
+        lambda a: "".join(format_threshold_lines(a)),
+    ):
+        assert NOT_CONVERGED_NOTE in shown(unusable)
+        assert NOT_CONVERGED_NOTE not in shown(analysis)
 
 
 @pytest.mark.slow

@@ -1,10 +1,13 @@
 """Analysing from the command line: what is written, what is left out, and what of it goes when a participant does."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
 import pytest
+
+from study.workflows.results.collect_sessions import collect_sessions
 
 pytestmark = pytest.mark.usefixtures("validated_here")
 
@@ -49,6 +52,15 @@ def test_a_damaged_session_is_left_out_and_named(run, data):
     assert code == 0
     assert "P02_001 cannot be used. Line 1 of events.jsonl" in err
     assert "25 Hz" in out
+
+
+def test_a_changed_protocol_that_kept_its_name_is_chosen_by_its_hash(run, data, small_text, tmp_path):
+    changed = tmp_path / "small.toml"
+    changed.write_text(re.sub(r'(?m)^title = ".*"$', 'title = "Changed"', small_text))
+    assert run("study", "--protocol", changed, "--observer", "ideal", "--subject", "P02", "--data", data)[0] == 0
+    (sentence,) = collect_sessions(data).exclusions
+    (digits,) = re.findall(r"P02_001 follows another protocol, \w+ \(([0-9a-f]+)\)\.", sentence)
+    assert [folder.name for folder in collect_sessions(data, digits).sessions] == ["P02_001"]
 
 
 @pytest.mark.slow

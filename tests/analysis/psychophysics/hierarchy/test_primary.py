@@ -13,10 +13,11 @@ from analysis.psychophysics.hierarchy.inference import (
     estimate_direction_limit,
     estimate_medians,
 )
+from analysis.psychophysics.hierarchy.objective import LOG_SLOPE_BOUNDS
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE, compute_primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED, simulate_run
-from tests.slow_instances import slow_after
+from tests.slow_instances import slow_after, slow_rows
 
 HZ = (5.0, 15.0, 25.0, 35.0, 45.0)
 NEAR_CAP = Crowd(HZ, (0.35, 0.6, 0.85, 3.0, 4.0))
@@ -94,6 +95,19 @@ def test_guessers_leave_everything_finite():
     assert found.converged
     assert np.isfinite([m.db for m in found.medians]).all()
     assert found.medians[1].above_cap
+
+
+@pytest.mark.parametrize(("people", "hz", "trials"), [(2, (5.0, 45.0), 8), *slow_rows((3, (5.0, 25.0, 45.0), 10))])
+def test_answers_that_bound_no_slope_leave_everything_finite(people, hz, trials):
+    """All right down to the lowest level at 5 Hz, all wrong at the cap elsewhere: the search went on to slopes of 1e100
+    and more, and ended in matrices of NaN."""
+    run, trial = (index.ravel() for index in np.indices((people * len(hz), trials)))
+    is_right = run % len(hz) == 0
+    level_db = np.where(is_right, 9.54 - trial * 30.0 / trials, 9.54 - trial % 2)
+    side = np.where((trial + run // len(hz)) % 2, 1.0, -1.0)
+    found = compute_primary_analysis(count_cells(tuple("abc"[:people]), hz, run, level_db, side, is_right), 3.0)
+    assert np.log(found.slope) <= LOG_SLOPE_BOUNDS[1] + 1e-9
+    assert np.isfinite([median.db for median in found.medians]).all()
 
 
 @pytest.mark.slow
