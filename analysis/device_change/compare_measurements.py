@@ -245,12 +245,11 @@ def _compare_noise(accepted: DeviceMeasures, today: DeviceMeasures, limits: Chan
     """Compare the rms at rest of each response. A ratio above the factor, in either direction, is a change."""
     # Relative standard error of the ratio of two rms values of independent samples.
     relative_error = np.sqrt(0.5 / accepted.noise_samples + 0.5 / today.noise_samples)
-    for channel, accepted_rms, today_rms in zip(
-        accepted.response.output_channels, accepted.noise, today.noise, strict=True
+    for channel, unit, accepted_rms, today_rms in zip(
+        accepted.response.output_channels, accepted.response.output_units, accepted.noise, today.noise, strict=True
     ):
         larger_rms, smaller_rms = max(float(accepted_rms), float(today_rms)), min(float(accepted_rms), float(today_rms))
         changed = larger_rms > limits.noise_factor * smaller_rms
-        unit = accepted.response.output_unit
         yield Change(
             "noise",
             channel,

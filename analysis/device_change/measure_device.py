@@ -15,6 +15,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal, find_runs
+from equalizer.tracking.feedforward.band_pass import remove_trend
 
 STROKES_BELOW_HZ = 1.0
 """Sinusoids below this frequency count as strokes: those of the shipped daily check have 0.5 Hz, and the lowest
@@ -164,11 +165,6 @@ def _measure_noise(recording: Recording, rest_responses: list[FloatArray]) -> tu
     samples."""
     sums_of_squares, sample_count = np.zeros(len(recording.response.channels)), 0
     for rest_response in rest_responses:
-        centred_index = np.arange(len(rest_response)) - (len(rest_response) - 1) / 2
-        detrended = rest_response - rest_response.mean(axis=0)
-        detrended = detrended - np.outer(
-            centred_index, centred_index @ detrended / max(float(centred_index @ centred_index), 1.0)
-        )
-        sums_of_squares += np.sum(detrended**2, axis=0)
+        sums_of_squares += np.sum(remove_trend(rest_response) ** 2, axis=0)
         sample_count += len(rest_response)
     return np.sqrt(sums_of_squares / max(sample_count, 1)), sample_count

@@ -76,7 +76,7 @@ def draw_transfer_functions(
             axes.set_title(f"{input_} → {output}", fontsize=9, loc="left", pad=3)
     _scale_axes(axes_grid[0][0], bins)
     figure.supylabel(
-        f"Magnitude ({_typeset_unit(response.output_unit)} per {_typeset_unit(response.input_unit)})", fontsize=10
+        f"Magnitude ({_typeset_units(response.output_units)} per {_typeset_units(response.input_units)})", fontsize=10
     )
     figure.supxlabel("Frequency (Hz)", fontsize=10)
     legend_handles = _make_legend_handles(bins, model, band_hz)
@@ -156,6 +156,6 @@ def _make_legend_handles(
     return handles
 
 
-def _typeset_unit(unit: str) -> str:
-    """Typeset an ASCII unit such as m/s^2 with a superscript 2."""
-    return unit.replace("^2", "²")
+def _typeset_units(units: Sequence[str]) -> str:
+    """Typeset the different ASCII units, such as m/s^2 with a superscript 2, separated by commas."""
+    return ", ".join(dict.fromkeys(units)).replace("^2", "²")

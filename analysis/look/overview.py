@@ -33,6 +33,7 @@ from analysis.look.plausibility import check_offsets, check_units
 from analysis.look.repeats import Repeats, check_repeats, find_repeats
 from analysis.wording import replace_time_units
 from equalizer.signals.recording import Recording
+from equalizer.signals.recording_checks import find_length_problems, find_segment_problems
 from equalizer.signals.summary import Summary, SummaryDisplay
 
 RESOLUTION = "resolution"
@@ -141,7 +142,10 @@ class Overview(SummaryDisplay):
 
 
 def make_overview(name: str, recording: Recording) -> Overview:
-    """Make the overview of a recording. name: name of the file, for tables and figures."""
+    """Make the overview of a recording. name: name of the file, for tables and figures. Raises ValueError where
+    the lengths or rates of its signals differ, or a segment is invalid."""
+    if problems := (*find_length_problems(recording), *find_segment_problems(recording.segments, len(recording))):
+        raise ValueError(f"{name} cannot be examined: {'; '.join(problems)}")
     channels, stretches, rate_hz = list_channels(recording), find_parts(recording), recording.sample_rate_hz
     spectra = estimate_cross_spectra(channels, stretches, rate_hz)
     bands = find_driven_bands(spectra, channels) if spectra else ()

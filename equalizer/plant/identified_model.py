@@ -13,7 +13,7 @@ import numpy as np
 
 from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.listed_problems import ListedProblemsError
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, collect_names, list_per_channel
 from equalizer.signals.summary import Summary, SummaryDisplay, format_range
 from equalizer.signals.units import UnknownUnitError, parse_unit
 
@@ -72,6 +72,8 @@ class IdentifiedModel(SummaryDisplay):
                 matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
                 matrix.flags.writeable = False
                 object.__setattr__(self, name, matrix)
+        for name in ("input_channels", "output_channels"):
+            object.__setattr__(self, name, collect_names(getattr(self, name)))
         problems = tuple(_list_problems(self))
         if problems:
             raise IdentifiedModelError(problems)
@@ -80,6 +82,16 @@ class IdentifiedModel(SummaryDisplay):
     def order(self) -> int:
         """Number of states, n."""
         return int(self.A.shape[0])
+
+    @property
+    def input_units(self) -> tuple[str, ...]:
+        """The unit of each command."""
+        return list_per_channel(self.input_unit, len(self.input_channels))
+
+    @property
+    def output_units(self) -> tuple[str, ...]:
+        """The unit of each response."""
+        return list_per_channel(self.output_unit, len(self.output_channels))
 
     @property
     def parameters(self) -> FloatArray:

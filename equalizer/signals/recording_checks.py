@@ -1,15 +1,19 @@
 """Consistency checks of a recording: lengths, rates, channels, segments, time stamps.
 
 `study.store.formats.recording_file` and `study.importing.build_recording` call `check_recording` when they read or
-import a recording; identification and diagnosis call `find_unusable_channels`.
+import a recording. Identification, fits and diagnosis call `list_recording_problems`, because a recording may also be
+made of arrays, and `find_unusable_channels`.
 """
 
 from collections.abc import Iterator, Sequence
+from numbers import Integral
 
 import numpy as np
+import numpy.typing as npt
 
 from equalizer.signals.recording import SEGMENT_KINDS, SEGMENT_ROLES, Recording, Segment
-from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.signal import Signal
+from equalizer.signals.units import UnknownUnitError, parse_unit
 
 
 def check_recording(recording: Recording) -> tuple[str, ...]:
@@ -19,6 +23,30 @@ def check_recording(recording: Recording) -> tuple[str, ...]:
     if recording.time_s is not None:
         problem_sentences.extend(_check_time_stamps(recording.time_s, len(recording)))
     return tuple(problem_sentences)
+
+
+def list_recording_problems(recordings: Sequence[Recording], names: Sequence[str] = ()) -> tuple[str, ...]:
+    """List the problems of `check_recording`, and units outside SI (a file's are converted when it is read); a sentence
+    each, with the recording's name where there are several. names: empty = recording 1, recording 2 and so on."""
+    names = names or [f"recording {number}" for number in range(1, len(recordings) + 1)]
+    return tuple(
+        problem if len(recordings) == 1 else f"{name}: {problem}"
+        for recording, name in zip(recordings, names, strict=True)
+        for problem in (*check_recording(recording), *_find_foreign_units(recording))
+    )
+
+
+def _find_foreign_units(recording: Recording) -> Iterator[str]:
+    """Find units that are not in SI, or not units. Yields a sentence per channel."""
+    for name, signal in collect_signals(recording).items():
+        for channel, unit in zip(signal.channels, signal.units, strict=True):
+            try:
+                si = parse_unit(unit).si
+            except UnknownUnitError as error:
+                yield f"{name} {channel}: {error}"
+            else:
+                if si != unit:
+                    yield f"{name} {channel} is in {unit}; convert its samples to SI, here {si}, and state that unit"
 
 
 def collect_signals(recording: Recording) -> dict[str, Signal]:
@@ -71,6 +99,8 @@ def find_segment_problems(segments: Sequence[Segment], sample_count: int) -> Ite
 
 def _check_segment(segment: Segment, sample_count: int) -> Iterator[str]:
     """Check a segment. Yields a predicate per problem, such as "stops at 12, but ...", to follow the segment's name."""
+    if not all(isinstance(count, Integral) for count in (segment.start, segment.stop, segment.period)):
+        yield f"has the start, stop or period {segment.start}, {segment.stop}, {segment.period}; give whole numbers"
     if not 0 <= segment.start < segment.stop:
         yield f"goes from {segment.start} to {segment.stop}; start must be at least 0 and below stop"
     elif segment.stop > sample_count:
@@ -85,15 +115,21 @@ def _check_segment(segment: Segment, sample_count: int) -> Iterator[str]:
         yield f"has the period {segment.period}; it counts samples, and 0 means not periodic"
 
 
-def _check_signals(recording: Recording) -> Iterator[str]:
-    """Check lengths, rates and channels of all signals against those of the response. Yields a sentence per problem."""
-    if len(recording) == 0:
-        yield "response holds no samples"
+def find_length_problems(recording: Recording) -> Iterator[str]:
+    """Find signals of another length or rate than the response. Yields a sentence per problem."""
     for name, signal in collect_signals(recording).items():
         if len(signal) != len(recording):
             yield f"{name} has {len(signal)} samples, but response has {len(recording)}; all must be equally long"
         if signal.sample_rate_hz != recording.sample_rate_hz:
             yield f"{name} is at {signal.sample_rate_hz:g} Hz, but response at {recording.sample_rate_hz:g} Hz"
+
+
+def _check_signals(recording: Recording) -> Iterator[str]:
+    """Check lengths, rates, channels and values of all signals. Yields a sentence per problem."""
+    if len(recording) == 0:
+        yield "response holds no samples"
+    yield from find_length_problems(recording)
+    for name, signal in collect_signals(recording).items():
         if not signal.channels:
             yield f"{name} has no channels"
         if len(set(signal.channels)) != len(signal.channels):
@@ -107,8 +143,9 @@ def _check_signals(recording: Recording) -> Iterator[str]:
         )
 
 
-def _check_time_stamps(time_s: FloatArray, sample_count: int) -> Iterator[str]:
+def _check_time_stamps(time_stamps_s: npt.ArrayLike, sample_count: int) -> Iterator[str]:
     """Check time stamps (s): one per sample, finite, strictly increasing. Yields a sentence for the first problem."""
+    time_s = np.asarray(time_stamps_s, dtype=np.float64)
     if time_s.shape != (sample_count,):
         yield f"time_s has shape {time_s.shape}, but must be ({sample_count},), one stamp per sample"
     elif not np.isfinite(time_s).all():

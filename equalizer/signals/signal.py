@@ -3,7 +3,7 @@ Recordings (`signals.recording`) and feedforward forces (`tracking.feedforward`)
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +14,12 @@ ComplexArray = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
-    """Samples with quantity, unit and channel names; the array is read-only. Raises ValueError for samples that are not
-    (n, channels), numbers of names, units or quantities that do not match the channels, and a sample rate that is not a
-    positive number."""
+    """Samples with quantity, unit and channel names; the array is read-only, and a copy unless it can never change.
+    Raises ValueError for samples that are not (n, channels), numbers of names, units or quantities that do not match
+    the channels, and a sample rate that is not a positive number."""
 
     samples: FloatArray
-    """(n, channels): time along the first dimension; NaN is a missing sample."""
+    """(n, channels): time along the first dimension; NaN is a missing sample, as is one that NumPy's mask hides."""
     sample_rate_hz: float
     quantity: str | tuple[str, ...]
     """One word for all channels ("force", "acceleration", "position", "torque", "angle", ...), or one per channel
@@ -30,18 +30,16 @@ class Signal:
     """Channel names."""
 
     def __post_init__(self) -> None:
-        samples = np.ascontiguousarray(self.samples, dtype=np.float64)
+        samples = _copy_unless_immutable(self.samples)
         if samples.ndim != 2:
             raise ValueError(f"samples must have shape (n, channels), not {samples.shape}")
+        object.__setattr__(self, "channels", collect_names(self.channels))
         if samples.shape[1] != len(self.channels):
             raise ValueError(f"{samples.shape[1]} columns of samples but {len(self.channels)} channel names")
         object.__setattr__(self, "quantity", _fold_equal_words("quantity", self.quantity, len(self.channels)))
         object.__setattr__(self, "unit", _fold_equal_words("unit", self.unit, len(self.channels)))
         if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0):
             raise ValueError(f"sample_rate_hz must be a positive number, not {self.sample_rate_hz}")
-        if samples.flags.writeable:
-            samples = samples.copy() if samples is self.samples else samples
-            samples.flags.writeable = False
         object.__setattr__(self, "samples", samples)
 
     def __len__(self) -> int:
@@ -50,12 +48,12 @@ class Signal:
     @property
     def quantities(self) -> tuple[str, ...]:
         """The quantity of each channel."""
-        return (self.quantity,) * len(self.channels) if isinstance(self.quantity, str) else self.quantity
+        return list_per_channel(self.quantity, len(self.channels))
 
     @property
     def units(self) -> tuple[str, ...]:
         """The unit of each channel."""
-        return (self.unit,) * len(self.channels) if isinstance(self.unit, str) else self.unit
+        return list_per_channel(self.unit, len(self.channels))
 
     @property
     def duration_s(self) -> float:
@@ -82,13 +80,41 @@ class Signal:
         )
 
 
+def collect_names(names: str | Sequence[str]) -> tuple[str, ...]:
+    """Collect names in a tuple; a single text is one name."""
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def list_per_channel(words: str | Sequence[str], channel_count: int) -> tuple[str, ...]:
+    """List quantities or units channel by channel. words: a single one for all channels, or one per channel."""
+    listed_words = collect_names(words)
+    return listed_words * channel_count if len(listed_words) == 1 else listed_words
+
+
+def _copy_unless_immutable(samples: Any) -> FloatArray:
+    """Copy samples of any real type to a contiguous, read-only array; one that has this form already, and whose memory
+    no other array can change, is returned itself. Masked samples become NaN."""
+    if type(samples) is np.ndarray and samples.dtype == np.float64 and samples.flags.c_contiguous:
+        owner: Any = samples
+        while isinstance(owner, np.ndarray) and not owner.flags.writeable:
+            owner = owner.base
+        if owner is None:
+            return cast(FloatArray, samples)
+    if isinstance(samples, np.ma.MaskedArray):
+        samples = np.ma.filled(samples.astype(np.float64), np.nan)
+    copy = np.array(samples, dtype=np.float64, order="C")
+    copy.flags.writeable = False
+    return copy
+
+
 def _fold_equal_words(field_name: str, words: str | tuple[str, ...], channel_count: int) -> str | tuple[str, ...]:
-    """Reduce equal words to a single one. Raises ValueError for another number of words than channels."""
+    """Reduce equal words to a single one. Raises ValueError for another number of words than channels, or None."""
     if isinstance(words, str):
         return words
-    if len(words) != channel_count:
+    word_count = len(words or ())
+    if word_count != channel_count:
         raise ValueError(
-            f"{len(words)} entries of {field_name} for {channel_count} channels; give one for all, or one per channel"
+            f"{word_count} entries of {field_name} for {channel_count} channels; give one for all, or one per channel"
         )
     return words[0] if len(set(words)) == 1 else tuple(words)
 

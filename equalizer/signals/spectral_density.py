@@ -51,9 +51,9 @@ def _average_segments(
     starts = range(0, len(first) - length + 1, length - length // 2)
     spectrum_sum = np.zeros((length // 2 + 1, *first.shape[1:]), dtype=np.complex128)
     for start in starts:
-        first_spectrum = _transform_windowed(first[start : start + length], window)
+        first_spectrum = transform_windowed(first[start : start + length], window)
         spectrum_sum += first_spectrum.conj() * (
-            first_spectrum if second is first else _transform_windowed(second[start : start + length], window)
+            first_spectrum if second is first else transform_windowed(second[start : start + length], window)
         )
     density = spectrum_sum / (len(starts) * rate_hz * float(np.sum(window**2)))
     # One-sided: each line except those at zero and at half the sample rate includes the power at its negative
@@ -62,6 +62,6 @@ def _average_segments(
     return np.asarray(np.fft.rfftfreq(length, 1 / rate_hz), dtype=np.float64), np.asarray(density)
 
 
-def _transform_windowed(segment: FloatArray, window: FloatArray) -> ComplexArray:
-    """Compute the FFT of a segment, without its mean and windowed."""
+def transform_windowed(segment: FloatArray, window: FloatArray) -> ComplexArray:
+    """Compute the FFT of a segment along its first axis, without its mean and windowed."""
     return np.asarray(np.fft.rfft(window * (segment - segment.mean(axis=0)), axis=0))

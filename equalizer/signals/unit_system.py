@@ -10,6 +10,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from equalizer.signals.recording import Recording
+
 _FACTOR = re.compile(r"(kg|N|m|s)(?:\^(\d+))?$")
 """A factor of an SI unit: its symbol, and its power where it is not 1."""
 _RATE_SUFFIXES = ("/s^2", "/s")
@@ -86,6 +88,13 @@ def determine_unit_system(commands: Sequence[str], motions: Sequence[str], time:
         (motions[0].removesuffix(suffix) for suffix in _RATE_SUFFIXES if motions[0].endswith(suffix)), motions[0]
     )
     return UnitSystem(commands[0], position_unit, time)
+
+
+def find_unit_system(recording: Recording) -> UnitSystem | None:
+    """Find the units of a model that was fitted to the recording: those of its channels; None where they are SI."""
+    time = "s" if recording.is_timed else "sample"
+    system = determine_unit_system(recording.command.units, recording.response.units, time)
+    return system if system.rotational is None else None
 
 
 def _decompose_base_unit(name: str) -> tuple[tuple[str, int], ...]:

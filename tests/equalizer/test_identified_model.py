@@ -70,3 +70,9 @@ def test_what_cannot_be_is_refused_in_words(model, changes, problem):
 def test_a_channel_named_twice_is_refused(model):
     with pytest.raises(IdentifiedModelError, match="input_channels names a channel twice: fx, fx"):
         replace(model, B=np.ones((2, 2)), D=np.zeros((1, 2)), input_channels=("fx", "fx"))
+
+
+def test_channels_may_be_a_list_and_units_are_listed_by_channel(model):
+    listed = replace(model, input_channels=["fx"], output_channels="ax")
+    assert (listed.input_channels, listed.output_channels) == (("fx",), ("ax",))
+    assert (listed.input_units, replace(model, output_unit=("m",)).output_units) == (("N",), ("m",))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.recording_checks import check_recording
+from equalizer.signals.recording_checks import check_recording, list_recording_problems
 from equalizer.signals.signal import Signal
 
 
@@ -105,3 +105,17 @@ def test_each_segment_within_a_longer_earlier_one_overlaps_it(recording):
 )
 def test_impossible_time_stamps_are_named(recording, time_s, problem):
     assert the_problem(replace(recording, time_s=time_s)).startswith(problem)
+
+
+def test_arrays_in_units_outside_si_are_a_problem_of_the_named_recording(recording):
+    millimetres = replace(recording, response=replace(recording.response, unit="mm"))
+    furlongs = replace(recording, command=replace(recording.command, unit=("furlong", "m")))
+    assert list_recording_problems([recording]) == ()
+    in_millimetres, unknown = list_recording_problems([millimetres, recording, furlongs], "abc")[1:]
+    assert in_millimetres == "a: response y is in mm; convert its samples to SI, here m, and state that unit"
+    assert unknown.startswith("c: command x: 'furlong' is not a unit known here")
+
+
+def test_indices_of_a_segment_are_whole_numbers(recording):
+    half = replace(recording, segments=(Segment(0, 50, "sine", period=12.5),))
+    assert the_problem(half) == "segment 1 has the start, stop or period 0, 50, 12.5; give whole numbers"

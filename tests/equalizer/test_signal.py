@@ -1,4 +1,5 @@
 import numpy as np
+import pandas as pd
 import pytest
 
 from equalizer.signals.signal import Signal
@@ -49,3 +50,36 @@ def test_picked_channels_keep_their_words_in_the_order_asked_for():
     assert (mixed.channels, mixed.quantity, mixed.unit) == (("b", "a"), ("angle", "force"), ("rad", "N"))
     assert mixed.samples.tolist() == [[1.0, 0.0], [4.0, 3.0]]
     assert (plain.quantity, plain.unit) == ("force", "N")
+
+
+@pytest.mark.parametrize("channels", [["fx"], "fx"])
+def test_channel_names_become_a_tuple(channels):
+    assert Signal(np.zeros((3, 1)), 1000.0, "force", "N", channels).channels == ("fx",)
+
+
+def test_a_unit_that_is_not_stated_is_refused_by_name():
+    with pytest.raises(ValueError, match="0 entries of unit for 2 channels"):
+        signal(unit=None)
+
+
+def test_a_masked_sample_is_missing():
+    masked = np.ma.array([[1], [2], [3]], mask=[[0], [1], [0]])
+    assert np.isnan(Signal(masked, 1000.0, "force", "N", ("fx",)).samples).tolist() == [[False], [True], [False]]
+
+
+def hide(source):
+    return np.lib.stride_tricks.as_strided(source, writeable=False)
+
+
+@pytest.mark.parametrize("view", [hide, lambda source: pd.DataFrame(source, copy=False)])
+def test_samples_do_not_follow_the_memory_that_they_were_given_in(view):
+    """A view that cannot be written itself may still change with the array that it shows."""
+    source = np.zeros((3, 1))
+    made = Signal(view(source), 1000.0, "force", "N", ("fx",))
+    source[0] = 1.0
+    assert made.samples[0, 0] == 0.0
+
+
+def test_samples_that_cannot_change_are_shared():
+    made = signal()
+    assert np.shares_memory(made.select_samples(1, 3).samples, made.samples)

@@ -3,12 +3,14 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import analysis
 import equalizer
 import study
 
@@ -73,6 +75,42 @@ def test_a_file_that_is_named_by_text_is_written_and_read(tmp_path, monkeypatch)
     assert study.read_recording("cart.h5").command.channels == ("fx",)
     assert study.read_mechanical_model("cart.toml").name == "cart"
     assert study.read_identified_model("model.h5").band_hz == (5.0, 35.0)
+
+
+CALCULATIONS = (equalizer.identify, equalizer.fit_mechanical_model, analysis.first_structure, analysis.diagnose)
+
+
+@pytest.mark.parametrize("calculation", CALCULATIONS)
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"command": {"samples": np.ones((49, 1))}}, "command has 49 samples, but response has 50"),
+        ({"command": {"sample_rate_hz": 2000.0}}, "command is at 2000 Hz, but response at 1000 Hz"),
+        ({"response": {"unit": "mm"}}, "response x is in mm; convert its samples to SI"),
+    ],
+)
+def test_one_recording_may_be_given_and_is_refused_where_its_signals_do_not_agree(calculation, changes, said):
+    signals = {
+        "command": equalizer.Signal(np.ones((50, 1)), 1000.0, "force", "N", ("fx",)),
+        "response": equalizer.Signal(np.ones((50, 1)), 1000.0, "position", "m", ("x",)),
+    }
+    signals |= {name: replace(signals[name], **change) for name, change in changes.items()}
+    with pytest.raises(ValueError, match=said):
+        calculation(equalizer.Recording("cart", **signals))
+
+
+def test_a_structure_that_does_not_exist_is_refused_by_name():
+    signal = equalizer.Signal(np.ones((50, 1)), 1000.0, "force", "N", ("fx",))
+    recording = equalizer.Recording("cart", signal, replace(signal, quantity="position", unit="m"))
+    with pytest.raises(ValueError, match="there is no structure 'mass spring'; the structures are mass-spring"):
+        analysis.first_structure(recording, "mass spring")
+
+
+@pytest.mark.parametrize("as_path", [str, Path])
+def test_a_protocol_is_read_from_a_path_or_its_text(as_path, tmp_path):
+    file = tmp_path / "own.toml"
+    file.write_text(study.read_study_protocol("direction_threshold").text, "utf-8")
+    assert study.read_study_protocol(as_path(file), as_path(tmp_path)).path == file
 
 
 def test_a_session_may_be_filed_under_a_folder_that_is_named_by_text(tmp_path, monkeypatch):

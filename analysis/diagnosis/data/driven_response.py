@@ -15,7 +15,7 @@ import numpy as np
 from analysis.diagnosis.limits import DRIVEN_COHERENCE, DRIVEN_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.signals.spectral_density import hann
+from equalizer.signals.spectral_density import hann, transform_windowed
 
 STRETCHES_PER_COMMAND = 12
 """Number of stretches per command channel; K is this times the number of commands. Chosen heuristically, like all
@@ -115,12 +115,7 @@ def _transform_stretches(recording: Recording, length: int) -> Iterator[tuple[Co
     for start in range(0, len(recording) - length + 1, length):
         commands, responses = (part.samples[start : start + length] for part in (recording.command, recording.response))
         if np.ptp(commands, axis=0).any() and np.isfinite(responses).all():
-            yield _transform_windowed(commands, window), _transform_windowed(responses, window)
-
-
-def _transform_windowed(samples: FloatArray, window: FloatArray) -> ComplexArray:
-    """Compute (lines, k): windowed spectrum of samples (n, k) about their mean."""
-    return np.asarray(np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0))
+            yield transform_windowed(commands, window), transform_windowed(responses, window)
 
 
 def _compute_coherence(commands: ComplexArray, responses: ComplexArray) -> tuple[FloatArray, float, float] | None:

@@ -25,7 +25,7 @@ from equalizer.plant.linear_simulation import compute_growth_rate, compute_poles
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.recording import Recording
-from equalizer.signals.recording_checks import find_unusable_channels, format_channels
+from equalizer.signals.recording_checks import find_unusable_channels, format_channels, list_recording_problems
 from equalizer.signals.signal import Signal
 
 
@@ -36,11 +36,11 @@ class NothingToDiagnoseError(ListedProblemsError):
 def require_comparable(
     recordings: Sequence[Recording], names: Sequence[str], remedy: str = "diagnose them one at a time"
 ) -> None:
-    """Require recordings with the same channels, units and rate. Raises NothingToDiagnoseError where they differ, or
-    without recordings. names: of the recordings. remedy: clause that ends each problem."""
+    """Require consistent recordings (`list_recording_problems`) with the same channels, units and rate. Raises
+    NothingToDiagnoseError otherwise. names: of the recordings. remedy: clause that ends each difference."""
     if not recordings:
         raise NothingToDiagnoseError(("there is no recording",))
-    reference, problems = recordings[0], []
+    reference, problems = recordings[0], list(list_recording_problems(recordings, names))
     for recording, name in zip(recordings[1:], names[1:], strict=True):
         for property_name, expected, actual in (
             ("sample rate", f"{reference.sample_rate_hz:g} Hz", f"{recording.sample_rate_hz:g} Hz"),

@@ -13,9 +13,12 @@ import numpy as np
 from analysis.diagnosis.balance.laws.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_comparable
 from analysis.diagnosis.first_model.model_structures import (
+    KINDS,
     BalancedRecordings,
     Kind,
+    ParameterEstimate,
     StructureFit,
     StructureFitError,
     balance_recordings,
@@ -28,6 +31,7 @@ from equalizer.identification.mechanical.mechanical_free_simulation import compu
 from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.summary import Summary, SummaryDisplay
 
 REMAINDER_REGRESSORS: dict[str, Callable[[Motion], FloatArray]] = {
     "the direction of motion (like dry friction)": lambda m: smooth_sign(m.velocity, 0.01 * float(m.velocity.std())),
@@ -50,8 +54,8 @@ class TriedStructure:
     """Why it was not fitted, or, for two modes, not preferred to mass-spring; else empty."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ChosenStructure:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class ChosenStructure(SummaryDisplay):
     """The chosen structure, all that were tried, why it was chosen, and a sentence on the error that remains."""
 
     fit: StructureFit
@@ -62,31 +66,42 @@ class ChosenStructure:
     remains: str
     """Sentence on the error that remains."""
 
+    def summary(self) -> Summary:
+        """Parameters with their 95 % intervals, the reason of the choice, and the error that remains, for display."""
+        return Summary(
+            f"First model: {self.fit.kind}",
+            (
+                *((parameter.name, _format_parameter(parameter)) for parameter in self.fit.parameters),
+                ("reason", self.reason),
+                ("remaining error", self.remains),
+            ),
+        )
+
+
+def _format_parameter(parameter: ParameterEstimate) -> str:
+    """Format value, interval where it is known, and unit."""
+    interval_text = "" if parameter.half_width is None else f" ± {parameter.half_width:.2g}"
+    return f"{parameter.value:.4g}{interval_text} {parameter.unit}"
+
 
 def choose_structure(
-    recordings: Sequence[Recording], requested_kind: Kind | None, on_progress: Callable[[float], None]
+    recordings: Recording | Sequence[Recording],
+    requested_kind: Kind | None = None,
+    on_progress: Callable[[float], None] = lambda share: None,
 ) -> ChosenStructure:
     """Fit the structures and choose one. requested_kind: fit this one only; None = choose. on_progress: receives the
     share done of a fit to spectra, 0 to 1. Raises StructureFitError where the requested structure, or all structures,
-    cannot be fitted."""
+    cannot be fitted, or does not exist, and for recordings that are inconsistent or not alike."""
+    recordings = _require_comparable(recordings)
+    if requested_kind is not None and requested_kind not in KINDS:
+        raise StructureFitError(f"there is no structure '{requested_kind}'; the structures are {', '.join(KINDS)}")
     try:
         balanced: BalancedRecordings | None = balance_recordings(recordings)
         no_balance_reason = ""
     except NoMotionError as problem:
         balanced, no_balance_reason = None, str(problem)
     if requested_kind is not None:
-        is_fitted_by_force = balanced is not None and requested_kind != "two-mode"
-        fit = (
-            fit_structure(balanced, requested_kind)
-            if is_fitted_by_force and balanced
-            else fit_modal_structure(recordings, requested_kind, on_progress)
-        )
-        return ChosenStructure(
-            fit,
-            (TriedStructure(fit.kind, fit.error, ""),),
-            "The structure was requested.",
-            describe_remaining_error(balanced, fit),
-        )
+        return _fit_requested(balanced, recordings, requested_kind, on_progress)
     structure_fits, trials = _fit_structures(balanced, recordings, on_progress)
     if not structure_fits:
         raise StructureFitError("; ".join(f"{trial.kind}: {trial.refusal}" for trial in trials))
@@ -105,6 +120,34 @@ def choose_structure(
     return _compare_with_two_modes(
         ChosenStructure(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress
     )
+
+
+def _fit_requested(
+    balanced: BalancedRecordings | None,
+    recordings: Sequence[Recording],
+    kind: Kind,
+    on_progress: Callable[[float], None],
+) -> ChosenStructure:
+    """Fit one structure: by force balance where that is possible. Other arguments and errors as `choose_structure`."""
+    fit = (
+        fit_structure(balanced, kind)
+        if balanced is not None and kind != "two-mode"
+        else fit_modal_structure(recordings, kind, on_progress)
+    )
+    trials = (TriedStructure(fit.kind, fit.error, ""),)
+    return ChosenStructure(fit, trials, "The structure was requested.", describe_remaining_error(balanced, fit))
+
+
+def _require_comparable(recordings: Recording | Sequence[Recording]) -> tuple[Recording, ...]:
+    """Return the recordings as a tuple. Raises StructureFitError without any, and where they are inconsistent or differ
+    in channels, units or rate."""
+    recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    names = [f"recording {number}" for number in range(1, len(recordings) + 1)]
+    try:
+        require_comparable(recordings, names, "fit them separately")
+    except NothingToDiagnoseError as refusal:
+        raise StructureFitError(str(refusal)) from refusal
+    return recordings
 
 
 def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:

@@ -14,9 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.balances import find_balances
-from analysis.diagnosis.balance.motion import NoMotionError
+from analysis.diagnosis.balance.linear_part import assign_channels
+from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
-from analysis.diagnosis.data.measured_motion import fill_gaps, find_unit_system, is_free_motion, is_quasi_static
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import has_payload
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.model_from_balance import build_plain_model
@@ -30,7 +32,7 @@ from analysis.diagnosis.first_model.model_structures import (
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, fit_rigid_model, should_use_rigid_model
 from analysis.diagnosis.limits import LEAST_MODEL_RESPONSE
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
-from analysis.wording import format_sentence
+from analysis.wording import conjoin, format_sentence
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError, MechanicalFitSettings
@@ -131,7 +133,8 @@ def fit_first_linear_model(
     except (MechanicalFitError, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         if (rigid_model := _try_rigid_model(recordings, source)) is not None:
             return rigid_model, (RIGID_REMARK,)
-        raise NothingToDiagnoseError((f"no model was given, and none can be fitted: {refusal}",)) from refusal
+        problems = (f"no model was given, and none can be fitted: {refusal}", *_describe_exchanged_channels(recordings))
+        raise NothingToDiagnoseError(problems) from refusal
     held_out_text = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on held-out data"
     first_remark = (
         f"No model was given. A linear model was fitted to {source} first, with an error of {100 * fit.error:.1f} "
@@ -139,10 +142,29 @@ def fit_first_linear_model(
         "parameters can represent, such as friction at one level as damping, is part of this model and is therefore "
         "not named."
     )
-    return replace(widen_tolerance(fit.model), units=find_unit_system(recordings[0])), (
+    return widen_tolerance(fit.model), (
         first_remark,
         *(format_sentence(remark) for remark in fit.remarks),
     )
+
+
+def _describe_exchanged_channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Describe, in a sentence, which response moves with which command where this is not the one of the same index;
+    empty where it is, and where the numbers of moving channels and commands differ."""
+    commands = recordings[0].command.channels
+    try:
+        motions = compute_motions(observe_parts(recordings, len(recordings[0].response.channels)))
+        if len(motions[0].channels) != len(commands):
+            return ()
+        assigned_channels = assign_channels(motions)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return ()
+    pairs = [
+        f"{motions[0].channels[channel]} moves with {commands[axis]}"
+        for axis, channel in enumerate(assigned_channels)
+        if channel != axis
+    ]
+    return (f"{conjoin(pairs)}: state the responses in the order of the commands that move them",) if pairs else ()
 
 
 def _find_stated_band(recordings: Sequence[Recording]) -> tuple[float, float] | None:

@@ -14,7 +14,7 @@ import numpy as np
 from analysis.diagnosis.balance.laws.law import measure_scales
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.data.measured_motion import find_unit_system, is_free_motion
+from analysis.diagnosis.data.measured_motion import is_free_motion
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, build_regressions, fit_jointly
 from analysis.diagnosis.limits import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
@@ -26,7 +26,7 @@ from equalizer.plant.effect_vocabulary import find_matrix_unit
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
-from equalizer.signals.unit_system import UnitSystem
+from equalizer.signals.unit_system import UnitSystem, find_unit_system
 
 Kind = Literal["mass-spring", "two-mode", "gravity", "massless", "motor"]
 """Structures: mass, damper and spring; the same with modes on the axes; a pendulum, whose weight acts as a spring;
@@ -167,12 +167,10 @@ def fit_modal_structure(
     held_out_errors = tuple(error.fit if error.held_out is None else error.held_out for error in fit.errors)
     remarks = tuple(format_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
-    first = recordings[0]
-    model = replace(widen_tolerance(fit.model), units=find_unit_system(first))
     return StructureFit(
         kind,
-        model,
-        _list_modal_parameters(replace(fit.model, units=model.units), first),
+        widen_tolerance(fit.model),
+        _list_modal_parameters(fit.model, recordings[0]),
         held_out_errors,
         channels,
         SIMULATED_MOTION,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray, list_per_channel
 
 BoolArray = npt.NDArray[np.bool_]
 """Array of truth values of any shape."""
@@ -35,8 +35,9 @@ class FrequencyResponse:
     """Names of the command channels, in the order of the inputs."""
     output_channels: tuple[str, ...]
     """Names of the response channels, in the order of the outputs."""
-    input_unit: str = "N"
-    output_unit: str = "m/s^2"
+    input_unit: str | tuple[str, ...] = "N"
+    """Unit of all commands, or the units channel by channel; so is the next."""
+    output_unit: str | tuple[str, ...] = "m/s^2"
     remarks: tuple[str, ...] = ()
     """Sentences on the estimate, such as why lines are not reliable."""
 
@@ -60,6 +61,16 @@ class FrequencyResponse:
 
     def __len__(self) -> int:
         return len(self.frequency_hz)
+
+    @property
+    def input_units(self) -> tuple[str, ...]:
+        """The unit of each command."""
+        return list_per_channel(self.input_unit, len(self.input_channels))
+
+    @property
+    def output_units(self) -> tuple[str, ...]:
+        """The unit of each response."""
+        return list_per_channel(self.output_unit, len(self.output_channels))
 
     def select_band(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
         """Select the lines of a band (Hz), limits included."""

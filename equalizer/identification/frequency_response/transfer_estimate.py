@@ -27,7 +27,7 @@ from equalizer.identification.frequency_response.reliable_lines import (
 )
 from equalizer.identification.frequency_response.shared_lines import SharedLines, solve_shared_lines
 from equalizer.signals.recording import Hold, Recording
-from equalizer.signals.recording_checks import find_unusable_channels
+from equalizer.signals.recording_checks import find_unusable_channels, list_recording_problems
 from equalizer.signals.signal import FloatArray, Signal
 
 
@@ -49,9 +49,9 @@ class EstimateSettings:
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
     """Estimate the transfer function from the total command to the response. Raises TransferEstimateError where there
-    is no recording, the recordings differ in hold, rate, channels or units, no segment for the fit yields a whole
-    period or window without missing samples, an output is constant, or there are fewer independent experiments than
-    inputs at every line."""
+    is no recording, one is inconsistent (`list_recording_problems`), the recordings differ in hold, rate, channels or
+    units, no segment for the fit yields a whole period or window without missing samples, an output is constant, or
+    there are fewer independent experiments than inputs at every line."""
     settings = settings or EstimateSettings()
     _check_compatible(recordings)
     experiment_set = _collect_experiments(recordings, settings)
@@ -161,17 +161,19 @@ def _join_groups(
         recordings[0].sample_rate_hz,
         command.channels,
         response.channels,
-        _format_unit(command),
-        _format_unit(response),
+        command.unit,
+        response.unit,
         (*experiment_set.remarks, *judgement.remarks),
     )
 
 
 def _check_compatible(recordings: Sequence[Recording]) -> None:
-    """Check the recordings: raises TransferEstimateError without any, and where hold, sample rate, channels or units
-    differ."""
+    """Check the recordings: raises TransferEstimateError without any, for an inconsistent one, and where hold, sample
+    rate, channels or units differ."""
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
+    if problems := list_recording_problems(recordings):
+        raise TransferEstimateError("; ".join(problems))
     first_recording = recordings[0]
     for recording_number, recording in enumerate(recordings[1:], start=2):
         for property_name, expected, value in (

@@ -41,13 +41,14 @@ from equalizer.identification.mechanical.mechanical_order import (
 )
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
 from equalizer.identification.mechanical.mechanical_refusals import refuse_noise, refuse_unstable, refuse_unsuitable
-from equalizer.identification.mechanical.mechanical_start import estimate_rigid_start
+from equalizer.identification.mechanical.mechanical_start import estimate_rigid_starts
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_order import balance_fit, choose_modes
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.identification.mechanical.physical_model import make_physical_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
+from equalizer.signals.unit_system import find_unit_system
 
 NONCOLLOCATED_ERROR = 1.1
 """Cross-validated error, in units of noise and floor (1: all that can be explained), from which sensors that are not
@@ -127,7 +128,7 @@ a mode at higher frequencies would bias it. Chosen."""
 
 
 def fit_mechanical_model(
-    recordings: Sequence[Recording],
+    recordings: Recording | Sequence[Recording],
     settings: MechanicalFitSettings | None = None,
     on_progress: Callable[[float], None] = lambda share: None,
     name: str = "fitted to recordings",
@@ -139,16 +140,12 @@ def fit_mechanical_model(
     share done, 0 to 1. Raises MechanicalFitError where the recordings do not determine a model: unsuitable channels,
     too few driven lines, only noise, or an unstable fit. The exceptions of `refine_unknowns` escape too.
     """
+    recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
     fit_segments, test_segments = split_fit_and_test(recordings)
     fit_lines = [spectra for pair in fit_segments if (spectra := compute_segment_lines(*pair)) is not None]
     segments = select_band(fit_lines, settings.band_hz)
-    if sum(len(segment.frequency_hz) for segment in segments) < _MIN_LINES:
-        raise MechanicalFitError(
-            "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
-            "record a sweep, noise or a multisine along every axis"
-        )
     band_hz = _find_covered_band(segments)
     groups = build_line_groups(segments, settings.floor)
     structure = _make_rigid_structure(recordings[0], settings, band_hz)
@@ -160,7 +157,7 @@ def fit_mechanical_model(
     refuse_unstable(final)
     test_lines = [spectra for pair in test_segments if (spectra := compute_segment_lines(*pair)) is not None]
     on_progress(1.0)
-    model = make_physical_model(final, name)
+    model = replace(make_physical_model(final, name), units=find_unit_system(recordings[0]))
     errors = _compute_channel_errors(model, fit_lines, test_lines, band_hz, recordings[0].response.channels)
     return MechanicalFit(
         model=model,
@@ -219,10 +216,8 @@ def _fit_rigid_starts(
         if line_count < _MIN_LINES * structure.inputs and (fits or band_share != _BAND_SHARES[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
-            rigid_structure, unknowns = estimate_rigid_start(
-                low_segments, replace(structure, delayed=delayed), settings.floor
-            )
-            fits.append(refine_unknowns(stage_groups, rigid_structure, unknowns, (band_hz[0], stage_end_hz)))
+            rigid_starts = estimate_rigid_starts(low_segments, replace(structure, delayed=delayed), settings.floor)
+            fits += (refine_unknowns(stage_groups, *start, (band_hz[0], stage_end_hz)) for start in rigid_starts)
     return fits
 
 
@@ -247,7 +242,13 @@ def _make_rigid_structure(
 
 
 def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
-    """Find the frequencies (Hz) of the lowest and the highest line of all segments."""
+    """Find the frequencies (Hz) of the lowest and the highest line of all segments. Raises MechanicalFitError where
+    they have fewer than `_MIN_LINES`."""
+    if sum(len(segment.frequency_hz) for segment in segments) < _MIN_LINES:
+        raise MechanicalFitError(
+            "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
+            "record a sweep, noise or a multisine along every axis"
+        )
     return (
         float(min(segment.frequency_hz[0] for segment in segments)),
         float(max(segment.frequency_hz[-1] for segment in segments)),

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
+from equalizer.signals.summary import Summary, SummaryDisplay, format_range
 
 
 class MechanicalFitError(ValueError):
@@ -75,8 +76,8 @@ class ChannelError:
     """Noise as estimated for each segment; None where it is not known."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MechanicalFit:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class MechanicalFit(SummaryDisplay):
     """Result of a mechanical fit. `error`, `held_out` and `noise` are root mean square over all channels, relative to
     the response, within the fitted band."""
 
@@ -98,3 +99,16 @@ class MechanicalFit:
     """Reason for the number of coordinates, as a sentence."""
     remarks: tuple[str, ...]
     """Sentences: assumptions, and what the recordings do not determine."""
+
+    def summary(self) -> Summary:
+        """Rows of the model, fitted band, errors and remarks, for display."""
+        errors = {"error": self.error, "held-out error": self.held_out, "noise": self.noise}
+        return Summary(
+            "Fitted mechanical model",
+            (
+                *self.model.summary().rows,
+                ("band", format_range(*self.band_hz, "Hz")),
+                *((name, f"{100 * value:.3g} %") for name, value in errors.items() if value is not None),
+                *(("remark", remark) for remark in self.remarks),
+            ),
+        )

@@ -69,7 +69,7 @@ LEAST_EXCITED_AMPLITUDE = 1e-2
 """Amplitude of a line, relative to the strongest, above which it counts as excited. Heuristic."""
 MAX_TRANSIENT_LINES = 2000
 """Largest number of lines of a segment with a transient; of more, every second, third, ... line is used. Chosen."""
-_NOISE_SMOOTHING_LINES = 9
+SMOOTHING_LINES = 9
 """Number of lines over which the noise power between periods and, with a transient, the excitation power are averaged.
 Chosen."""
 
@@ -112,11 +112,11 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
         return None
     command, response = (spectrum.mean(axis=0) for spectrum in spectra)
     if len(starts) > 1:
-        noise = smooth_over_lines(compute_period_variance(spectra[1]), _NOISE_SMOOTHING_LINES) / len(starts)
+        noise = smooth_over_lines(compute_period_variance(spectra[1]), SMOOTHING_LINES) / len(starts)
     else:
         noise = estimate_local_noise(command, response)
     if transient:  # a line without power between excited lines counts as excited too
-        excitation_norm = np.sqrt(smooth_over_lines(excitation_norm**2, _NOISE_SMOOTHING_LINES))
+        excitation_norm = np.sqrt(smooth_over_lines(excitation_norm**2, SMOOTHING_LINES))
     frequency_hz = np.arange(1, len(command) + 1) * rate_hz / length
     excited = excitation_norm > LEAST_EXCITED_AMPLITUDE * excitation_norm.max()
     return SegmentLines(frequency_hz, command, response, noise, excited, transient, rate_hz, recording.hold)

@@ -1,8 +1,8 @@
 """Checks that refuse a mechanical fit; each message states the cause and, where there is one, the remedy.
 
-Before the fit: no recording, recordings that disagree in rate, hold, channels or units, responses fewer than commands
-or of unsuitable quantities, too few samples, constant or empty channels. After it: a model that explains no channel, or
-is unstable. Called by `mechanical_fit`.
+Before the fit: no recording, an inconsistent one, recordings that disagree in rate, hold, channels or units, responses
+fewer than commands or of unsuitable quantities, too few samples, constant or empty channels. After it: a model that
+explains no channel, or is unstable. Called by `mechanical_fit`.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
-from equalizer.signals.recording_checks import find_unusable_channels, format_channels
+from equalizer.signals.recording_checks import find_unusable_channels, format_channels, list_recording_problems
 from equalizer.signals.signal import FloatArray
 
 LEAST_SAMPLES = 64
@@ -28,6 +28,8 @@ def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
     module docstring."""
     if not recordings:
         raise MechanicalFitError("there is no recording to fit a model to; give at least one")
+    if problems := list_recording_problems(recordings):
+        raise MechanicalFitError("; ".join(problems))
     first_recording = recordings[0]
     for number, recording in enumerate(recordings[1:], start=2):
         for property_name, expected, actual in (

@@ -15,7 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_lines import SegmentLines
+from equalizer.identification.frequency_response.noise_floor import smooth_over_lines
+from equalizer.identification.mechanical.mechanical_lines import SMOOTHING_LINES, SegmentLines
 from equalizer.identification.mechanical.mechanical_response import compute_sensor_response
 from equalizer.identification.mechanical.mechanical_structure import Structure, pack_mass, pack_square_root
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -29,13 +30,13 @@ _MAX_DELAY_CYCLES = 8.0
 """Longest trial delay, in periods of the highest line of the first segment. Chosen."""
 
 
-def estimate_rigid_start(
+def estimate_rigid_starts(
     segments: Sequence[SegmentLines], structure: Structure, floor: float
-) -> tuple[Structure, FloatArray]:
-    """Estimate a structure without modes, its signs and mass scale, and its unknowns (parameters,). A
-    negative mass of a single axis means that its sensor is positive against the command: its sign is reversed. The
-    delay is estimated where `structure.delayed`. floor: expected error of a linear model, relative to the response's
-    magnitude."""
+) -> list[tuple[Structure, FloatArray]]:
+    """Estimate a structure without modes, its mass scale, and its unknowns (parameters,). A negative mass of a single
+    axis is that of a sensor that is positive against the command, or is due to noise or other physics in this band:
+    then a start with the reversed sign follows. The delay is estimated where `structure.delayed`. floor: expected error
+    of a linear model, relative to the response's magnitude."""
     m = structure.inputs
     if structure.delayed:
         delays_s = np.linspace(0.0, _MAX_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _TRIAL_DELAY_COUNT)
@@ -45,8 +46,9 @@ def estimate_rigid_start(
         delay_s = structure.actuator.delay_s
     triangles = _solve_matrices(segments, structure, floor, delay_s)[0].reshape(3, -1)
     mass, damping, stiffness = (build_symmetric_matrix(triangle, m) for triangle in triangles)
+    reversed_starts = []
     if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
-        return estimate_rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
+        reversed_starts = estimate_rigid_starts(segments, replace(structure, signs=(-1.0,)), floor)
     eigenvalues, eigenvectors = np.linalg.eigh(mass)
     largest_eigenvalue = max(float(np.abs(eigenvalues).max()), 1e-300)
     mass = (eigenvectors * np.maximum(eigenvalues, _LEAST_EIGENVALUE * largest_eigenvalue)) @ eigenvectors.T
@@ -62,7 +64,7 @@ def estimate_rigid_start(
         # The rows apply to the axes' motions, of which the axes' own sensors may measure the negative.
         rows = _fit_further_output_rows(segments, m) * np.array(structure.signs)
         unknowns[structure.slices["rows"]] = rows.ravel()
-    return structure, unknowns
+    return [(structure, unknowns), *reversed_starts]
 
 
 def _solve_matrices(
@@ -80,9 +82,7 @@ def _build_regression(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Build regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
-    imaginary parts, divided by the expected error of the force. delay_s: delay of the command that is removed.
-
-    The expected error includes five times `floor` (chosen): lines with little noise then do not dominate."""
+    imaginary parts, divided by the expected error of the force. delay_s: delay of the command that is removed."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
     # A held force shows in the acceleration one sample later, in velocity and position half a sample later.
     hold_delay = 1.0 if order == 2 else 0.5
@@ -95,9 +95,7 @@ def _build_regression(
         sensor_path = compute_sensor_response(structure.sensor.bandwidth_hz, z, spectra.rate_hz) * z ** (-delay_samples)
         sensor_path = sensor_path * np.exp(-s * delay_s)
         motion = spectra.response[:, :m] * np.array(structure.signs) / sensor_path[:, None]
-        response_norm = np.linalg.norm(spectra.response[:, :m], axis=1)
-        noise_ratio = np.sqrt(np.nan_to_num(spectra.noise[:, :m]).sum(axis=1)) / np.maximum(response_norm, 1e-300)
-        weight = spectra.excited / (np.linalg.norm(spectra.command, axis=1) * np.hypot(5 * floor, noise_ratio) + 1e-300)
+        weight = _compute_weights(spectra, m, floor)
         columns = [
             _compute_entry_force(motion * (s ** (power - order))[:, None], pair)
             for power in (2, 1, 0)
@@ -119,6 +117,23 @@ def _build_regression(
         np.concatenate([complex_rows.real, complex_rows.imag]),
         np.concatenate([complex_targets.real, complex_targets.imag]),
     )
+
+
+def _compute_weights(spectra: SegmentLines, m: int, floor: float) -> FloatArray:
+    """Compute 1 / expected error of the force (lines,), zero at lines that are not excited; m: number of driven axes.
+
+    The expected error includes five times `floor` (chosen): lines with little noise then do not dominate. With a
+    transient, the magnitudes of command and response are those of the lines around: a line without a command of its own
+    has the transient's error, too."""
+    command_norm, response_norm = (
+        np.linalg.norm(signal, axis=1) for signal in (spectra.command, spectra.response[:, :m])
+    )
+    if spectra.transient:
+        command_norm, response_norm = (
+            np.sqrt(smooth_over_lines(norm**2, SMOOTHING_LINES)) for norm in (command_norm, response_norm)
+        )
+    noise_ratio = np.sqrt(np.nan_to_num(spectra.noise[:, :m]).sum(axis=1)) / np.maximum(response_norm, 1e-300)
+    return np.asarray(spectra.excited / (command_norm * np.hypot(5 * floor, noise_ratio) + 1e-300))
 
 
 def list_triangle_pairs(m: int) -> list[tuple[int, int]]:

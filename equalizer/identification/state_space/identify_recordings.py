@@ -20,6 +20,7 @@ from equalizer.identification.state_space.settings import ORDINARY_DECAY_S, Iden
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.recording import Recording
+from equalizer.signals.summary import Summary, SummaryDisplay
 
 DISTURBING_DECAY_S = 1.0
 """Time constant (s) above which the transient at the start of an excitation disturbs the estimate. Chosen: a transient
@@ -35,8 +36,8 @@ SMOOTHED_REMARK = (
 """Remark of a model that was fitted to local averages."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordingsIdentification:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class RecordingsIdentification(SummaryDisplay):
     """Frequency response of recordings, and the state-space model fitted to it."""
 
     estimate: FrequencyResponse
@@ -44,6 +45,10 @@ class RecordingsIdentification:
     fitted: FrequencyResponse
     """The frequency response that the model was fitted to: the estimate, or its local averages."""
     identified: IdentificationResult
+
+    def summary(self) -> Summary:
+        """Rows of `identified`, for display."""
+        return self.identified.summary()
 
 
 def identify_recordings(

@@ -12,7 +12,7 @@ from itertools import chain, takewhile
 
 import numpy as np
 
-from equalizer.effects.discovered_law import derive_axis_letters
+from equalizer.effects.discovered_law import DERIVATIVE_PREFIXES, derive_axis_letters
 from equalizer.effects.law_entry import find_law_letter
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
@@ -22,8 +22,6 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.compensation.known_forces import ForceLaw
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion
 
-MOTION_PREFIXES = ("", "v", "a")
-"""Prefixes of the signals of a motion, before the letter of the axis: position, velocity, acceleration."""
 TABLE_SIZE = 2001
 """Number of commands in the table by which a command map is inverted; also samples of the cycle in
 `compute_linear_share`. Chosen."""
@@ -52,7 +50,7 @@ SENSOR_ERROR = "it is an error of the sensor: a force against it would turn that
 def explain_law_not_compensated(law: Law, inputs: tuple[str, ...]) -> str:
     """Explain why a law is not compensated, as a clause after "because"; empty for a compensated law. inputs: channels
     of the commands."""
-    motion_signals = {prefix + letter for letter in derive_axis_letters(inputs) for prefix in MOTION_PREFIXES}
+    motion_signals = {prefix + letter for letter in derive_axis_letters(inputs) for prefix in DERIVATIVE_PREFIXES}
     if law.acts_on == "response":
         return SENSOR_ERROR
     if law.acts_on == "force":
@@ -76,7 +74,7 @@ def compute_compensating_force(
         prefix + letter: motion_samples[:, axis]
         for axis, letter in enumerate(axis_letters)
         for prefix, motion_samples in zip(
-            MOTION_PREFIXES, (motion.position, motion.velocity, motion.acceleration), strict=True
+            DERIVATIVE_PREFIXES, (motion.position, motion.velocity, motion.acceleration), strict=True
         )
     }
     return -evaluate(_smooth_signs(law, slip_mps), signals, rate_hz)

@@ -1,7 +1,8 @@
 """Zero-phase band-pass filtering of a finite record, in the frequency domain.
 
 The gain is 1 within the band and has raised-cosine edges outside it, because a sharp edge would ring for seconds.
-Called by `learning.iteration`, `planned_motion`, the compensation of effects and `study.workflows.equalizer`.
+Called by `learning.iteration`, `planned_motion`, the compensation of effects, `study.workflows.equalizer` and
+`analysis.device_change`.
 """
 
 import numpy as np
@@ -27,10 +28,10 @@ def filter_to_band(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[fl
 
 
 def remove_trend(samples: FloatArray) -> FloatArray:
-    """Subtract from each channel of samples (N, channels), N >= 2, the straight line through it (least squares), such
+    """Subtract from each channel of samples (N, channels), N >= 1, the straight line through it (least squares), such
     as the offset and the drift of a sensor, which `filter_to_band` would ring with at the ends."""
-    position = np.linspace(-1.0, 1.0, len(samples))[:, np.newaxis]
-    slope = (position * samples).sum(axis=0) / (position**2).sum()
+    position = np.arange(len(samples))[:, np.newaxis] - (len(samples) - 1) / 2
+    slope = (position * samples).sum(axis=0) / max((position**2).sum(), 0.5)  # 0.5: that of two samples
     return np.asarray(samples - samples.mean(axis=0) - slope * position)
 
 

@@ -97,8 +97,8 @@ def compute_feedforward_forces(
     Finite-horizon LQR tracking from rest, which equals least squares with the block-Toeplitz matrix of the impulse
     response and a weight on the forces. reference: (N, p), m/s²; settings: None = defaults. Raises ForceLimitError for
     forces above the cap (with `constrain` off), TrackingError where the reference has no content in the band or the cap
-    cannot be kept, or for an invalid weight, ValueError for an invalid cap and where sample rate, number of channels or
-    unit are not the model's.
+    cannot be kept, or for an invalid weight or a reference with values that are not finite, ValueError for an invalid
+    cap, where sample rate, channels or units are not the model's, and for a model whose commands are not in N.
     """
     settings = settings or FeedforwardSettings()
     check_reference(model, reference)

@@ -6,7 +6,7 @@ rest is the solution of a finite-horizon linear-quadratic tracking problem (`lqr
 given.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -72,9 +72,7 @@ class ModelEqualizer:
         loop_state = compute_periodic_state(gains.problem, continued_loop)
         faded_reference = envelope[:, None] * reference.samples[np.arange(onset_ticks) % loop_ticks]
         forces = track(gains, faded_reference, final_state=loop_state).forces
-        return Signal(
-            forces - self._compute_onset_spring_force(reference, loop, envelope), *_get_signal_properties(loop)
-        )
+        return replace(loop, samples=forces - self._compute_onset_spring_force(reference, loop, envelope))
 
     def _compute_onset_spring_force(self, reference: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
         """Compute the spring force (ticks, m), in N, to subtract during the onset, approximated by its value in the
@@ -83,11 +81,6 @@ class ModelEqualizer:
         ticks = np.arange(len(envelope)) % len(reference)
         faded_force: FloatArray = envelope[:, None] * spring_force[ticks]
         return faded_force
-
-
-def _get_signal_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
-    """Return sample rate, quantity, unit and channels of a signal, in the order of the fields of `Signal`."""
-    return loop.sample_rate_hz, loop.quantity, loop.unit, loop.channels
 
 
 @lru_cache(maxsize=8)

@@ -5,6 +5,8 @@ forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the re
 `model_equalizer` and `workspace.models_at_place`, among others.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
@@ -82,10 +84,11 @@ def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
 
 def check_reference(model: IdentifiedModel, reference: Signal) -> None:
     """Check a reference signal against the model. Raises ValueError for a signal whose rate, number of channels or
-    units are not the model's, or that has the model's channels in another order."""
+    units are not the model's, or that has the model's channels in another order, and for a model whose commands are not
+    forces in N."""
     if reference.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
-            f"the model runs at {model.sample_rate_hz:g} Hz, not at {reference.sample_rate_hz:g} Hz; "
+            f"the model runs at {model.sample_rate_hz:.12g} Hz, not at {reference.sample_rate_hz:.12g} Hz; "
             "resample the reference"
         )
     output_count = model.C.shape[0]
@@ -98,9 +101,18 @@ def check_reference(model: IdentifiedModel, reference: Signal) -> None:
             f"the model has the outputs {', '.join(model.output_channels)}, but the reference has the channels "
             f"{', '.join(reference.channels)}; put them in the same order"
         )
-    units = set(reference.units)
-    if units != set([model.output_unit] if isinstance(model.output_unit, str) else model.output_unit):
+    if reference.units != model.output_units:
         raise ValueError(
-            f"the model answers in {model.output_unit}, but the reference is in {', '.join(sorted(units))}; both must "
-            "agree"
+            f"the model answers in {_format_units(model.output_units)}, but the reference is in "
+            f"{_format_units(reference.units)}; both must agree, channel by channel"
         )
+    if set(model.input_units) != {"N"}:
+        raise ValueError(
+            f"the model's commands are in {_format_units(model.input_units)}, but forces and their cap are in N; "
+            "identify a model from forces in N, or use the tracker alone (stored_gains, track)"
+        )
+
+
+def _format_units(units: Sequence[str]) -> str:
+    """Format the units of channels: one where all are equal, else all, separated by commas."""
+    return ", ".join(units if len(set(units)) > 1 else units[:1])

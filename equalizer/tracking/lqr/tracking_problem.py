@@ -46,13 +46,14 @@ class TrackingWeights:
         if not (np.isfinite(self.low_frequency_hz) and self.low_frequency_hz > 0):
             raise TrackingError(f"low_frequency_hz is {self.low_frequency_hz}; it must be a positive number")
         if self.output_weight is not None:
-            object.__setattr__(self, "output_weight", _require_output_weight(self.output_weight))
+            object.__setattr__(self, "output_weight", require_weight("output_weight", self.output_weight))
 
 
 @dataclass(frozen=True, eq=False)
 class TrackingProblem:
-    """Matrices of the model with its penalised outputs, and of the cost. Made by `make_tracking_problem`; the arrays
-    are read-only. n: order, m: forces, p: tracked outputs, q: all outputs."""
+    """Matrices of the model with its penalised outputs, and of the cost. `make_tracking_problem` makes it of a model;
+    the arrays are read-only. n: order, m: forces, p: tracked outputs, q: all outputs. Raises TrackingError for shapes
+    that do not agree, values that are not finite, and a weight that is not symmetric and positive semidefinite."""
 
     A: FloatArray
     """(n, n)"""
@@ -75,6 +76,25 @@ class TrackingProblem:
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "Q", "R"):
             object.__setattr__(self, name, copy_read_only(getattr(self, name)))
+        self._require_consistent_matrices()
+        require_weight("Q", self.Q)
+        require_weight("R", self.R)
+
+    def _require_consistent_matrices(self) -> None:
+        """Raise TrackingError for values that are not finite, and shapes that do not agree."""
+        matrices = {name: getattr(self, name) for name in ("A", "B", "C", "D", "Q", "R")}
+        for name, matrix in matrices.items():
+            if matrix.ndim != 2 or not np.isfinite(matrix).all():
+                raise TrackingError(f"{name} must be a matrix of finite numbers")
+        n, m, q = self.order, self.inputs, len(self.C)
+        shapes = {"A": (n, n), "B": (n, m), "C": (q, n), "D": (q, m), "Q": (q, q), "R": (m, m)}
+        for name, shape in shapes.items():
+            if matrices[name].shape != shape:
+                raise TrackingError(
+                    f"{name} has shape {matrices[name].shape}, but {n} states, {m} forces and {q} outputs need {shape}"
+                )
+        if not 0 < self.outputs <= q:
+            raise TrackingError(f"outputs is {self.outputs}; the tracked outputs are the first of the {q} rows of C")
 
     @property
     def order(self) -> int:
@@ -165,13 +185,13 @@ def copy_read_only(values: FloatArray) -> FloatArray:
     return copy
 
 
-def _require_output_weight(Q: FloatArray) -> FloatArray:
-    """Return a read-only copy of Q. Raises TrackingError unless it is square, finite, symmetric (to within 1e-8) and
-    positive semidefinite (to within 1e-12 of its largest entry)."""
-    Q = copy_read_only(Q)
-    if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all() or not np.allclose(Q, Q.T, rtol=1e-12):
-        raise TrackingError("output_weight must be a square symmetric matrix of finite numbers")
-    lowest_eigenvalue = float(np.linalg.eigvalsh(Q)[0]) if Q.size else 0.0
-    if lowest_eigenvalue < -1e-12 * float(np.abs(Q).max(initial=0.0)):
-        raise TrackingError(f"output_weight has the eigenvalue {lowest_eigenvalue:g}; none may be negative")
-    return Q
+def require_weight(name: str, weight: FloatArray) -> FloatArray:
+    """Return a read-only copy of a weight. Raises TrackingError unless it is square, finite, symmetric (to within 1e-8)
+    and positive semidefinite (to within 1e-12 of its largest entry). name: of the weight, for the message."""
+    W = copy_read_only(weight)
+    if W.ndim != 2 or W.shape[0] != W.shape[1] or not np.isfinite(W).all() or not np.allclose(W, W.T, rtol=1e-12):
+        raise TrackingError(f"{name} must be a square symmetric matrix of finite numbers")
+    lowest_eigenvalue = float(np.linalg.eigvalsh(W)[0]) if W.size else 0.0
+    if lowest_eigenvalue < -1e-12 * float(np.abs(W).max(initial=0.0)):
+        raise TrackingError(f"{name} has the eigenvalue {lowest_eigenvalue:g}; none may be negative")
+    return W

@@ -79,12 +79,13 @@ def list_shipped_protocols() -> tuple[str, ...]:
     )
 
 
-def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]:
+def read_protocol(name: Path | str, data: Path | str | None = None) -> ProtocolFile[Protocol]:
     """Read a shipped protocol by its name, or any protocol by its path. data: the data folder, if there is one.
 
     A lock beside the file or in `data` must agree with the protocol. Raises WrongUseError (no such protocol),
     CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock, a table of texts).
     """
+    name, data = str(name), None if data is None else Path(data)
     path = None if name in list_shipped_protocols() else _resolve_path(name)
     text = (
         files("protocols").joinpath(f"{name}.toml").read_text("utf-8")
@@ -99,7 +100,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     return ProtocolFile(protocol, text, path, _find_lock(protocol, path, data))
 
 
-def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[StudyProtocol]:
+def read_study_protocol(name: Path | str, data: Path | str | None = None) -> ProtocolFile[StudyProtocol]:
     """Read a study protocol. Raises as `read_protocol`, and WrongUseError for a recording protocol."""
     file = read_protocol(name, data)
     if not isinstance(file.protocol, StudyProtocol):
@@ -107,7 +108,7 @@ def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[Stu
     return ProtocolFile(file.protocol, file.text, file.path, file.lock)
 
 
-def read_recording_protocol(name: str, data: Path | None = None) -> ProtocolFile[RecordingProtocol]:
+def read_recording_protocol(name: Path | str, data: Path | str | None = None) -> ProtocolFile[RecordingProtocol]:
     """Read a recording protocol. Raises as `read_protocol`, and WrongUseError for a study protocol."""
     file = read_protocol(name, data)
     if not isinstance(file.protocol, RecordingProtocol):

@@ -66,7 +66,7 @@ class WrittenRecording:
 
 def record_device(
     plan: RecordingPlan,
-    on_progress: Callable[[float], None],
+    on_progress: Callable[[float], None] = lambda seconds: None,
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
     """Record the whole protocol. `on_progress(seconds)` receives the recorded time, which decreases when a piece is

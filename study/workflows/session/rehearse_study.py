@@ -63,7 +63,9 @@ def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
     return find_observer(kind, rehearsal.seed)
 
 
-def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: Callable[[int], None]) -> None:
+def rehearse_study(
+    rehearsal: Rehearsal, workers: int | Executor = 1, on_finished: Callable[[int], None] = lambda count: None
+) -> None:
     """Run the sessions of all participants. on_finished: called after each with the number of finished sessions.
 
     workers: a number of processes of this computer, or an executor, whose workers need not share a disk with it: they

@@ -1,6 +1,7 @@
 """The diagnosis as a call of values: what it refuses, and what it fits where no model is given."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from analysis.diagnosis import diagnose_values as module
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import compute_prediction_error
+from analysis.diagnosis.first_model.first_model import REPLACED_REMARK
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -48,8 +50,33 @@ def test_the_same_recording_twice_is_refused():
         module.diagnose_values([record_cart(1), record_cart(1)], MODEL)
 
 
-def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
-    seen = {}
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"names": ("a", "b")}, "names has 2 entries for 1 recordings"),
+        ({"without": ("columb_friction",)}, "there is no effect columb_friction to leave out"),
+        ({"compared": "forces"}, "compared is 'forces'; allowed are auto, motion, force"),
+    ],
+)
+def test_settings_without_a_meaning_are_refused(settings, said):
+    with pytest.raises(NothingToDiagnoseError, match=said):
+        module.diagnose_values(record_cart(1), MODEL, DiagnosisSettings(**settings))
+
+
+def test_forces_are_not_compared_where_only_accelerations_were_measured():
+    cart = record_cart(1)
+    accelerated = replace(cart, response=replace(cart.response, quantity="acceleration", unit="m/s^2"))
+    with pytest.raises(NothingToDiagnoseError, match="forces cannot be compared"):
+        module.diagnose_values(
+            accelerated, replace(MODEL, quantity="acceleration"), DiagnosisSettings(compared="force")
+        )
+
+
+@pytest.mark.parametrize(("mass_ratio", "remark"), [(1, "fitted"), (2, REPLACED_REMARK)])
+def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch, mass_ratio, remark):
+    """Where the diagnosis replaces it, the remarks say so instead of how it was fitted."""
+    seen, findings = {}, Mock(remarks=(), given=replace(MODEL, mass=mass_ratio * MODEL.mass))
+    findings.diagnosis.error = "predicted force"
 
     def fitted(recordings, on_progress, whose):
         seen["fitted to"] = recordings
@@ -57,16 +84,17 @@ def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
 
     def diagnosed(recordings, model, settings, map_, progress):
         seen.update(settings=settings, model=model)
-        return FINDINGS
+        return findings
 
     monkeypatch.setattr(module, "fit_first_linear_model", fitted)
     monkeypatch.setattr(module, "diagnose", diagnosed)
-    monkeypatch.setattr(module, "replace", lambda found, **new: new if found is FINDINGS else replace(found, **new))
+    monkeypatch.setattr(module, "replace", lambda found, **new: new if found is findings else replace(found, **new))
     clean = record_cart(2)
     found = module.diagnose_values(record_cart(1), settings=DiagnosisSettings(clean=(clean,)))
     assert np.array_equal(seen["fitted to"][0].response.samples, clean.response.samples)
     assert (seen["model"], seen["settings"].fitted) == (MODEL, True)
-    assert "fitted" in found["remarks"]
+    assert remark in found["remarks"]
+    assert ("fitted" in found["remarks"]) is (mass_ratio == 1)
 
 
 @pytest.mark.slow
@@ -95,7 +123,3 @@ def test_the_improved_model_is_of_the_commands_as_they_were_recorded():
         compute_prediction_error(against, each, "test").without_gain for each in (found.retuned, found.improved)
     )
     assert with_them < 0.2 * without < 0.1
-
-
-class FINDINGS:
-    remarks = ()

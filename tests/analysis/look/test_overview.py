@@ -47,3 +47,9 @@ def test_without_spectra_no_command_is_called_undriven(make_recording, make_nois
     overview = make_overview("gaps.h5", make_recording(make_noise(2000, seed=2), response))
     assert overview.spectra is None
     assert not any("is not driven" in check.finding for check in overview.checks)
+
+
+def test_signals_and_segments_that_do_not_fit_together_are_refused(make_recording, make_noise):
+    made = make_recording(make_noise(200), make_noise(201), segments=(Segment(0, 300, "noise"),))
+    with pytest.raises(ValueError, match="bad cannot be examined: command has 200 samples, .*; segment 1 stops at 300"):
+        make_overview("bad", made)

@@ -7,9 +7,12 @@ import pytest
 
 from analysis.diagnosis.balance.motion import find_motion_signal
 from analysis.diagnosis.data.driven_response import compute_response_significance
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
+from analysis.diagnosis.first_model import fit_without_model
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from analysis.diagnosis.limits import DRIVEN_DEVIATIONS
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
 
 
@@ -186,3 +189,22 @@ def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
     assert sure is None or sure >= DRIVEN_DEVIATIONS
     assert unsure is not None
     assert unsure < DRIVEN_DEVIATIONS
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["in order", "exchanged"])
+def test_a_refusal_names_responses_that_were_exchanged(monkeypatch, order):
+    def refuse(*_):
+        raise MechanicalFitError("the matrix is singular")
+
+    pushes = [smooth_noise(3000, seed) for seed in (1, 2)]
+    speeds = [simulate_speed(push, mass) for push, mass in zip(pushes, (0.05, 0.1), strict=True)]
+    recording = make_recording(
+        [(name, "force", "N", push) for name, push in zip(("fx", "fy"), pushes, strict=True)],
+        [(name, "velocity", "m/s", speeds[k]) for name, k in zip(("vx", "vy"), order, strict=True)],
+    )
+    monkeypatch.setattr(fit_without_model, "fit_mechanical_model", refuse)
+    monkeypatch.setattr(fit_without_model, "_try_rigid_model", lambda *_: None)
+    with pytest.raises(NothingToDiagnoseError) as refusal:
+        fit_without_model.fit_first_linear_model([recording], lambda share: None)
+    said = "vy moves with fx and vx moves with fy: state the responses in the order of the commands that move them"
+    assert refusal.value.problems[1:] == ((said,) if order == (1, 0) else ())

@@ -88,3 +88,16 @@ def test_a_rigid_body_is_refused_where_no_amplitude_is_stated(segments):
     )  # fmt: skip
     with pytest.raises(MechanicalFitError, match="no segment of a recording states an amplitude above 0"):
         fit_rigid_body(SimpleNamespace(band_hz=(3.0, 60.0)), still, still, MechanicalFitSettings((3.0, 60.0)))
+
+
+def test_a_model_of_currents_states_that_its_mass_is_not_in_kg():
+    wave = np.random.default_rng(1).standard_normal((2000, 1))
+    recording = Recording(
+        "motor",
+        Signal(wave, RATE_HZ, "current", "A", ("ix",)),
+        Signal(played(one_piece(), wave), RATE_HZ, "acceleration", "m/s^2", ("ax",)),
+    )
+    fit = fit_mechanical_model(recording, MechanicalFitSettings(most_modes=0, fit_delay=False))
+    assert fit.model.mass[0, 0] == pytest.approx(0.28, rel=0.02)
+    assert fit.model.system.express("kg") == "A s^2/m"
+    assert len(repr(fit).splitlines()) < 15

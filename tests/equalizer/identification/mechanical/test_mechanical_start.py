@@ -5,7 +5,7 @@ import pytest
 
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines
 from equalizer.identification.mechanical.mechanical_response import compute_sampled_response
-from equalizer.identification.mechanical.mechanical_start import estimate_rigid_start
+from equalizer.identification.mechanical.mechanical_start import estimate_rigid_starts
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
@@ -20,7 +20,7 @@ def test_a_further_sensor_is_not_reversed_with_the_sensor_of_the_axis():
         lines_hz, command, response, np.full((39, 2), np.nan), np.ones(39, dtype=bool), False, 500.0, Hold.ZERO_ORDER
     )
     rigid = Structure(1, 2, "acceleration", 1.0, 100.0, (1.0,))
-    structure, unknowns = estimate_rigid_start([segment], rigid, 0.02)
+    (_, (structure, unknowns)) = estimate_rigid_starts([segment], rigid, 0.02)
     assert structure.signs == (-1.0,)
     model = structure.build_model(unknowns)
     assert model.mass[0, 0] == pytest.approx(0.3, rel=0.05)

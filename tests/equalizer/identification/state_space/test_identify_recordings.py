@@ -1,5 +1,7 @@
 """A resonance that rings longer than the ordinary bound keeps its height where local averages are fitted."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from equalizer.identification.state_space.identify_recordings import identify_recordings
@@ -43,3 +45,18 @@ def test_the_expected_error_of_local_averages_is_that_on_the_lines_themselves(pl
     identified = found.identified
     assert error < 1.02 * identified.expected_error
     assert identified.expected_error == np.hypot(identified.scatter, identified.misfit.upper_bound)
+
+
+def test_a_device_may_have_units_of_their_own_along_each_axis(plants, synthetic):
+    """A force and a torque; the results are printed as a few lines."""
+    recording = synthetic.sweeps(plants, 4.5, 37.0, 2.0, periods=3)
+    mixed = replace(
+        recording,
+        command=replace(recording.command, unit=("N", "N", "N m")),
+        response=replace(recording.response, unit=("m/s^2", "m/s^2", "rad/s^2")),
+    )
+    settings = IdentificationSettings(order=6, draws=0, longer_horizons=(0,), record_horizons=())
+    found = identify_recordings(mixed, settings, smooth=False)
+    assert found.identified.model.input_unit == ("N", "N", "N m")
+    assert found.identified.model.output_unit == ("m/s^2", "m/s^2", "rad/s^2")
+    assert len(repr(found).splitlines()) < 20

@@ -89,3 +89,21 @@ def test_channels_in_another_order_are_refused(model, noise):
     turned = replace(noise, channels=model.output_channels[::-1])
     with pytest.raises(ValueError, match="put them in the same order"):
         compute_feedforward_forces(model, turned)
+
+
+def test_units_are_compared_channel_by_channel(model, noise):
+    units = ("m/s^2", "m/s^2", "rad/s^2")
+    with pytest.raises(ValueError, match=r"answers in m/s\^2, m/s\^2, rad/s\^2, but the reference is in rad/s\^2, m/s"):
+        compute_feedforward_forces(replace(model, output_unit=units), replace(noise, unit=units[::-1]))
+
+
+@pytest.mark.parametrize("unit", ["A", "N m", ("N", "N", "N m")])
+def test_commands_that_are_no_forces_in_newtons_are_refused(model, noise, unit):
+    """Amperes would else be stated as newtons, and compared with the cap in newtons."""
+    with pytest.raises(ValueError, match="but forces and their cap are in N"):
+        compute_feedforward_forces(replace(model, input_unit=unit), noise)
+
+
+def test_a_rate_that_differs_in_the_last_digits_is_refused_by_all_its_digits(model, noise):
+    with pytest.raises(ValueError, match=r"runs at 1000 Hz, not at 1000\.000001 Hz"):
+        compute_feedforward_forces(model, replace(noise, sample_rate_hz=RATE_HZ + 1e-6))

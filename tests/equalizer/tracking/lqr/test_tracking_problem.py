@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,20 @@ def test_weights_that_cannot_weigh_are_refused(arguments, message):
 def test_an_output_weight_of_another_size_is_refused(model_of):
     with pytest.raises(TrackingError, match="3 outputs need"):
         make_tracking_problem(model_of(4, 0), TrackingWeights(output_weight=np.eye(2)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"Q": -np.eye(3)}, "Q has the eigenvalue -1"),
+        ({"Q": np.triu(np.ones((3, 3)))}, "Q must be a square symmetric matrix"),
+        ({"R": -np.eye(3)}, "R has the eigenvalue -1"),
+        ({"R": 1e-3}, "R must be a matrix of finite numbers"),
+        ({"A": np.full((4, 4), np.nan)}, "A must be a matrix of finite numbers"),
+        ({"B": np.zeros((3, 3))}, r"B has shape \(3, 3\), but 4 states, 3 forces and 3 outputs need \(4, 3\)"),
+        ({"outputs": 4}, "outputs is 4; the tracked outputs are the first of the 3 rows of C"),
+    ],
+)
+def test_matrices_that_make_no_problem_are_refused(problem_of, changes, said):
+    with pytest.raises(TrackingError, match=said):
+        replace(problem_of(4, 1), **changes)
