@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.data.find_segments import find_segments
 from analysis.diagnosis.data.input_checks import require_different, require_usable_data
-from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
+from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, fill_gaps
 from analysis.diagnosis.data.observed_parts import LEAST_SAMPLES, find_parts
 from analysis.diagnosis.limits import BRIDGED_GAP_ERROR, LEAST_GAPLESS_SHARE
 from analysis.diagnosis.types import Mask
@@ -154,7 +154,7 @@ def _bridge_or_cut_gaps(recording: Recording, name: str) -> tuple[Recording, str
     if not is_missing.any() or is_missing.all():
         return recording, ""
     all_gaps = find_runs(is_missing)
-    interpolated_samples = _interpolate_gaps(recording.command.samples)
+    interpolated_samples = fill_gaps(recording.command.samples)
     wide_gaps = [gap for gap in all_gaps if not _can_bridge(recording.command.samples, gap[1] - gap[0])]
     narrow_gaps = [gap for gap in all_gaps if gap not in wide_gaps]
     parts = [part for stretch in find_parts(recording) for part in _list_stretches_between_gaps(stretch, wide_gaps)]
@@ -202,14 +202,3 @@ def _list_stretches_between_gaps(stretch: Stretch, gaps: Sequence[Stretch]) -> l
         stretches.append((stretch_start, min(max(start, stretch_start), stretch[1])))
         stretch_start = max(stop, stretch_start)
     return [(start, stop) for start, stop in stretches if stop - start >= LEAST_SAMPLES]
-
-
-def _interpolate_gaps(samples: FloatArray) -> FloatArray:
-    """Interpolate NaN in samples (n, m) linearly, channel by channel, constant beyond the ends; a channel of NaN alone
-    is unchanged."""
-    interpolated_samples, indices = np.array(samples), np.arange(len(samples))
-    for column in interpolated_samples.T:
-        is_known = np.isfinite(column)
-        if is_known.any():
-            column[:] = np.interp(indices, indices[is_known], column[is_known])
-    return interpolated_samples

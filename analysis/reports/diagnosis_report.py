@@ -147,7 +147,7 @@ def _make_effect_section(findings: Findings, effect_index: int, pictures: Sequen
     if not rivals and not describe_equivalents(effect):
         paragraphs.append("No rival fits nearly as well.")
     return Section(
-        capitalise(format_effect_title(effect, _has_single_input(findings))),
+        capitalise(format_effect_title(effect, findings.given.inputs == 1)),
         paragraphs=tuple(paragraphs),
         pictures=_select_signatures(findings, effect, pictures),
         tables=(tabulate_parameters(effect), *((tabulate_rivals(effect),) if effect.rivals else ())),
@@ -223,11 +223,6 @@ def _make_sentence_sections(heading: str, sentence: str) -> list[Section]:
 def _describe_effect(findings: Findings, effect: NamedEffect) -> str:
     """Describe a named effect with the text on its signature, if it has one."""
     return describe_effect(effect, get_signature_text(findings, effect), extract_device(findings))
-
-
-def _has_single_input(findings: Findings) -> bool:
-    """Whether the diagnosed model has a single input, so that sentences need not name the axis."""
-    return findings.given.inputs == 1
 
 
 def _select_pictures(pictures: Sequence[Picture], kind: str) -> tuple[Picture, ...]:

@@ -8,7 +8,7 @@ raise. Begin with `render_real_report`.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.real_answer.real_answer import OwnParameter, PairOutcome, RealAnswer
+from analysis.diagnosis.real_answer.real_answer import FurtherTest, OwnParameter, PairOutcome, RealAnswer
 from analysis.diagnosis.unit_wording import format_error, format_value
 from analysis.evaluation.blind_test.injected_faults import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import list_error_rows
@@ -140,7 +140,7 @@ def _make_recording_section(real_answer: RealAnswer, picture: Picture | None) ->
         *(describe_parameter(parameter) for parameter in real_answer.numbers),
         *_describe_pair(real_answer.pair),
     )
-    further_sentences = tuple(_describe_further_test(*test) for test in _list_further_tests(real_answer))
+    further_sentences = tuple(map(_describe_further_test, real_answer.further))
     objections = tuple(f"An expert would object: {objection}" for objection in real_answer.objections)
     paragraphs = (
         *((real_answer.title,) if real_answer.title else ()),
@@ -217,19 +217,14 @@ def _describe_pair(pair: PairOutcome | None) -> tuple[str, ...]:
     )
 
 
-def _list_further_tests(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
-    """List the arguments of `_describe_further_test` for each further test."""
-    return [(test.recording, test.error, test.retuned, test.after, test.problem) for test in real_answer.further]
-
-
-def _describe_further_test(recording: str, error: str, retuned: float | None, after: float | None, problem: str) -> str:
-    """Describe a further test in a sentence: its errors as shares of the signal (retuned: of the re-tuned model; after:
-    with the named effects), or the problem for which it could not be made. error: name of the error measure."""
-    if problem:
-        return f"A further test, {recording}, could not be made: {problem}"
+def _describe_further_test(test: FurtherTest) -> str:
+    """Describe a further test in a sentence: its errors as shares of the signal, of the re-tuned model and with the
+    named effects, or the problem for which it could not be made."""
+    if test.problem:
+        return f"A further test, {test.recording}, could not be made: {test.problem}"
     return (
-        f"A further test, {recording}, nothing fitted to it, by {error}: re-tuned {format_error(retuned)}, with what "
-        f"was found {format_error(after)}."
+        f"A further test, {test.recording}, nothing fitted to it, by {test.error}: re-tuned "
+        f"{format_error(test.retuned)}, with what was found {format_error(test.after)}."
     )
 
 

@@ -13,11 +13,19 @@ from analysis.diagnosis.balance.actuator_equivalents import withdraw_ambiguous_n
 from analysis.diagnosis.balance.compare_free_laws import compare_with_free_laws
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import find_driven_channels, search_with_linear_part
-from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motion_band_hz, compute_motions
+from analysis.diagnosis.balance.motion import (
+    Motion,
+    NoMotionError,
+    compute_motion_band_hz,
+    compute_motions,
+    find_motion_signal,
+)
+from analysis.diagnosis.data.measured_motion import stays_at_limit
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.limits import MOVING_TIME_SHARE, SECOND_BAND_SHARE, STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
+from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 
@@ -32,7 +40,8 @@ def find_balances(
     recordings: at least one, with the same channels. excluded: names of effects that are left out, of the catalogue or
     of `FREE_LAWS`. Where all axes can be tested and no law is named in the band that noise allows (`band.py`), the
     narrower band in which the device moves is tried, because power of the command above that band hides laws; then the
-    samples in motion alone. Laws outside the catalogue are compared with the result."""
+    samples in motion alone. Laws outside the catalogue are compared with the result. No law is named from accelerations
+    that stay at a limit."""
     is_imposed = any(recording.meta.get("imposed") for recording in recordings)
     excluded |= ACTUATOR_LAWS if is_imposed else frozenset()
     try:
@@ -41,6 +50,9 @@ def find_balances(
         balances = _fit_balances(motions, recordings, excluded, time_left, map_)
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
+    if clipped_channels := _find_clipped_accelerations(recordings, motions):
+        reason = f"{conjoin(clipped_channels)} stays at the limit of its sensor, so that the forces lack its peaks"
+        return tuple(balance.withdraw_names(reason) for balance in balances)
     for select in (restrict_to_motion_band, select_samples_in_motion):
         if any(balance.named or not balance.tested for balance in balances) or not time_left():
             break
@@ -50,6 +62,15 @@ def find_balances(
         balance if balance is catalogue_balance or is_imposed else withdraw_ambiguous_names(balance)
         for balance, catalogue_balance in zip(compared_balances, balances, strict=True)
     )
+
+
+def _find_clipped_accelerations(recordings: Sequence[Recording], motions: Sequence[Motion]) -> list[str]:
+    """Find the channels of accelerations that stay at a limit; none where positions or speeds were measured: a device
+    may rest at a stop, or keep its speed, but under changing forces it does not keep its largest acceleration."""
+    if motions[0].order < 2:
+        return []
+    samples = np.vstack([signal.samples for recording in recordings if (signal := find_motion_signal(recording))])
+    return [name for name, readings in zip(motions[0].channels, samples.T, strict=True) if stays_at_limit(readings)]
 
 
 MotionSelector = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]

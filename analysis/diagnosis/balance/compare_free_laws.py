@@ -6,15 +6,18 @@ significantly better than the chosen sum, and leaves at most 1 - `FREE_LAW_GAIN`
 (of the linear balance's where no law of the sum can be named), the sum with the fewest parameters at about the same
 error is completed by further laws (`add_further_laws`) and judged on held-out data, with the catalogue's laws as
 rivals. It replaces the chosen sum where a free law with a gain of at least `FREE_LAW_GAIN` is named, or where there is
-such a law, the chosen sum has no named law, and the rms error is at most half of the linear balance's.
+such a law, the chosen sum has no named law, and the rms error is at most half of the linear balance's. A chosen sum of
+laws of several families loses its names where a single free law is significantly better.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from analysis.diagnosis.balance.change_laws import append_laws
 from analysis.diagnosis.balance.judge_laws import Balance, judge_structure
+from analysis.diagnosis.balance.judged_law import find_family
 from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS, make_free_laws
 from analysis.diagnosis.balance.laws.law import measure_scales
 from analysis.diagnosis.balance.linear_part import is_freely_turning
@@ -31,6 +34,8 @@ from analysis.diagnosis.limits import FREE_LAW_GAIN, MOST_SUMMED_LAWS, PLAINER_S
 
 MOST_COMPARED_SUMS = 12
 """Number of sums whose nonlinear parameters are refined. Chosen: there are eleven free laws."""
+SURPASSED_REASON = "a single law that the catalogue lacks explains more than the sum of laws to which it belongs"
+"""Reason, in a message, not to name the laws of a sum."""
 CONTACTS = {"end_stop", "contact_beyond_position"}
 """Laws of a contact that closes at a position, in the catalogue and outside."""
 
@@ -55,8 +60,9 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
     # A catalogue sum of which nothing can be named is no explanation: the linear balance is then the reference.
     reference_error = (balance.chosen if balance.named else balance.search.linear).error
     best_sum = min(sums, key=lambda s: s.error, default=balance.chosen)
+    kept_balance = withdraw_names_of_surpassed_sum(balance, sums)
     if best_sum.error > (1 - FREE_LAW_GAIN) * reference_error or not improves_significantly(balance.chosen, best_sum):
-        return balance
+        return kept_balance
     good_sums = [
         s for s in sums if s.error <= best_sum.error + PLAINER_SHORTFALL * (balance.chosen.error - best_sum.error)
     ]
@@ -71,7 +77,16 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
     free_laws = [law for law in judged_balance.laws if law.is_free and law.gain_low > 0 and law.gain >= FREE_LAW_GAIN]
     # A law that is not named is a candidate only where its sum halves the linear balance's error on the test blocks.
     halves_error = judged_balance.error <= np.sqrt(1 - FREE_LAW_GAIN) * balance.linear and not balance.named
-    return judged_balance if free_laws and (halves_error or any(law.named for law in free_laws)) else balance
+    return judged_balance if free_laws and (halves_error or any(law.named for law in free_laws)) else kept_balance
+
+
+def withdraw_names_of_surpassed_sum(balance: Balance, sums: Sequence[Structure]) -> Balance:
+    """Withdraw the names of laws of several families where a single free law leaves significantly less error than their
+    sum, which then only approximates it. sums: with one free law each, alone or with others."""
+    effects = [law.law.effect for law in balance.laws if not law.law.is_linear]
+    has_families = len({frozenset(find_family(effect)) for effect in effects}) > 1
+    is_surpassed = any(len(s.laws) == 1 and improves_significantly(balance.chosen, s) for s in sums)
+    return balance.withdraw_names(SURPASSED_REASON) if has_families and is_surpassed else balance
 
 
 def _list_sums(regression: Regression, chosen: Structure) -> tuple[Regression, list[Structure]]:

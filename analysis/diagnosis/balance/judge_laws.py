@@ -123,17 +123,21 @@ def _find_shared_channels(regression: Regression, law_indices: Sequence[int]) ->
 
 
 def judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
-    """Test each law of `chosen`, and further laws. The divisor of shares is at least 1e-6 of the linear error."""
+    """Test each law of `chosen`, and further laws. None is named where those that could be, with linear laws, are less
+    than `NAMED_CEILING_SHARE` of what all laws explain. The divisor of shares is at least 1e-6 of the linear error."""
     regression = search.regression
     errors, linear_errors = _compute_errors(regression, chosen.laws), _compute_errors(regression, ())
     ceiling = _compute_ceiling(regression, errors)
     decrease = max(float(linear_errors.sum() - ceiling), 1e-6 * float(linear_errors.sum()), 1e-300)
-    coverage = 1 - float(errors.sum() - ceiling) / decrease
-    judged = [_judge_law(regression, chosen.laws, index, (errors, decrease, coverage)) for index in chosen.laws]
+    judged = [_judge_law(regression, chosen.laws, index, (errors, decrease)) for index in chosen.laws]
     further_laws = _judge_further_laws(regression, chosen, (errors, decrease))
     ratios = [float(np.sqrt(error / _sum_power(regression))) for error in (linear_errors.sum(), errors.sum(), ceiling)]
     laws = _name_once_per_family(sorted(judged, key=lambda law: -law.gain))
-    return Balance(search, chosen, laws, further_laws, ratios[0], ratios[1], ratios[2], search.complete)
+    balance = Balance(search, chosen, laws, further_laws, ratios[0], ratios[1], ratios[2], search.complete)
+    counted = [law.law_index for law in laws if law.named or law.law.is_linear or law.objection == SHAPE_OBJECTION]
+    uncovered = float(_compute_errors(regression, counted).sum() - ceiling) / decrease
+    reason = f"{100 * min(uncovered, 1.0):.0f} % of what all laws explain would remain: the main cause is another"
+    return balance if uncovered <= 1 - NAMED_CEILING_SHARE else balance.withdraw_names(reason)
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
@@ -169,11 +173,10 @@ def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float
 
 
 def _judge_law(
-    regression: Regression, law_indices: Sequence[int], law_index: int, reference: tuple[FloatArray, float, float]
+    regression: Regression, law_indices: Sequence[int], law_index: int, reference: tuple[FloatArray, float]
 ) -> JudgedLaw:
-    """Test law `law_index` of `law_indices`. reference: squared errors (blocks,) with all of these laws; decrease of
-    their sum by all laws of the regression together; share of that decrease by these laws."""
-    full, decrease, coverage = reference
+    """Test law `law_index` of `law_indices`. reference: squared errors (blocks,) with these; their fall by all laws."""
+    full, decrease = reference
     other_laws = tuple(index for index in law_indices if index != law_index)
     reduced = _compute_errors(regression, other_laws)
     gain, gain_low = bootstrap_gain(reduced, full)
@@ -182,7 +185,7 @@ def _judge_law(
     equivalents, probability = _find_equivalents(regression, other_laws, law_index, (reduced, full))
     force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_power(regression)))
     weakness = f"it explains {100 * force_share:.1f} % of the force, less than such recordings can confirm"
-    objection = _find_objection(law, values, (gain, gain_low, share, coverage), equivalents) or (
+    objection = _find_objection(law, values, (gain, gain_low, share), equivalents) or (
         weakness if force_share < LAW_FORCE_SHARE else ""
     )
     ratio = compute_force_ratio(regression, law_indices, law_index)
@@ -243,10 +246,10 @@ def _find_equivalents(
 
 
 def _find_objection(
-    law: Law, values: dict[str, float] | None, scores: tuple[float, float, float, float], equivalents: tuple[str, ...]
+    law: Law, values: dict[str, float] | None, scores: tuple[float, float, float], equivalents: tuple[str, ...]
 ) -> str:
-    """Find the reason not to name a law, empty if none. scores: gain, its lower bound, share and coverage."""
-    gain, gain_low, share, coverage = scores
+    """Find the reason not to name a law, empty if none. scores: gain, its lower bound and share."""
+    gain, gain_low, share = scores
     if law.is_linear:
         return "it is a linear model of a higher order: part of the first model and no missing physics"
     if values is None:
@@ -257,9 +260,6 @@ def _find_objection(
         return f"it explains {100 * share:.1f} % of what all laws together explain"
     if law.effect in FREE_LAWS and gain < FREE_LAW_GAIN:
         return "a law that the catalogue lacks is named only where it halves the error on held-out data"
-    if coverage < NAMED_CEILING_SHARE:
-        return (f"even with it, {100 * (1 - coverage):.0f} % of what all laws together explain remain: the main cause "
-                "is another")  # fmt: skip
     family = find_family(law.effect) | (CONDITION_LAWS if law.effect in CONDITION_LAWS else set())
     other_families = [effect for effect in equivalents if effect not in family]
     rivals = [effect for effect in equivalents if law.effect not in list_special_cases(effect)]
@@ -288,7 +288,7 @@ def _judge_further_laws(
         errors = _compute_errors(regression, law_indices := (*chosen.laws, index))
         gain, gain_low = bootstrap_gain(chosen_errors, errors)
         values, share = fit_values(regression, law_indices)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
-        objection = ("it explains too little in addition to the named laws" if chosen.laws
+        objection = ("it explains too little in addition to the other terms" if chosen.laws
                   else WEAK_GAIN_OBJECTIONS[gain > FURTHER_LAW_GAIN])  # fmt: skip
         if gain > 0 and gain_low > 0:
             law = regression.laws[index]

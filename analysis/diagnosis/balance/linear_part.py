@@ -66,11 +66,17 @@ def search_with_linear_part(
 
 def find_driven_channels(motions: Sequence[Motion]) -> tuple[int, ...]:
     """Find, per force, the channel of the motion that it drives: the channel of the same index or else the last, or,
-    where more motions than forces were measured, that whose acceleration the regression needs most (linear
-    assignment)."""
+    where more motions than forces were measured, that of `assign_channels`."""
     force_count, channel_count = motions[0].force.shape[1], len(motions[0].channels)
     if channel_count <= force_count:
         return tuple(min(axis, channel_count - 1) for axis in range(force_count))
+    return assign_channels(motions)
+
+
+def assign_channels(motions: Sequence[Motion]) -> tuple[int, ...]:
+    """Assign to each force the channel whose acceleration its regression needs most (linear assignment). motions: with
+    at least as many channels as forces."""
+    force_count, channel_count = motions[0].force.shape[1], len(motions[0].channels)
     errors = [_compute_errors_without_channel(motions, axis, channel_count) for axis in range(force_count)]
     # Imported here: most diagnoses do not need this slow import.
     from scipy.optimize import linear_sum_assignment

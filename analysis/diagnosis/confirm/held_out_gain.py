@@ -93,7 +93,7 @@ def _compute_remaining_share(measure: ErrorMeasure, candidate: FittedCandidate, 
     masks = [record.test for record in measure.records]
     if not any(mask.any() for mask in masks):
         return 0.0
-    residual_rms = compute_residual_rms(measure.records, candidate.fitted.residuals, masks) * measure.unit
+    residual_rms = compute_residual_rms(candidate.fitted.residuals, masks) * measure.unit
     channel_rms = compute_signal_rms(measure.records, masks)
     is_above_noise = channel_rms > HELD_OUT_MISMATCH_ERROR * measure.noise
     if not is_above_noise.any():

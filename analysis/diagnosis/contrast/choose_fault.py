@@ -147,18 +147,11 @@ def _find_objection(candidate: JudgedFault, sets_differ: bool) -> str:
             f"its gain between stretches of one set is {candidate.control_gain:.2g} already, and "
             f"{candidate.gain:.2g} between the two sets"
         )
-    main_parameter = next(iter(candidate.values))
-    if (
-        abs(_compute_distance_from_no_fault(candidate, main_parameter))
-        <= T_QUANTILE * candidate.standard_errors[main_parameter]
-    ):
+    main_parameter, value = next(iter(candidate.values.items()))
+    distance_from_no_fault = abs(value - (1.0 if main_parameter == "gain" else 0.0))
+    if distance_from_no_fault <= T_QUANTILE * candidate.standard_errors[main_parameter]:
         return "the confidence interval of its parameter includes the value without the fault"
     return ""
-
-
-def _compute_distance_from_no_fault(candidate: JudgedFault, name: str) -> float:
-    """Compute the difference of a parameter from 1 for a gain, else from 0."""
-    return candidate.values[name] - (1.0 if name == "gain" else 0.0)
 
 
 def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Comparison) -> bool:

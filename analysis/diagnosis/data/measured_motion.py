@@ -9,15 +9,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.limits import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.simulation.sensor_path import undo_low_pass
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.unit_system import UnitSystem, determine_unit_system
 
 FORCE_QUANTITIES = frozenset({"force", "torque"})
 """Quantities that count as forces: a recording with such a response was driven by an imposed motion."""
+
+READING_TOLERANCE = 1e-9
+"""Relative difference up to which readings count as equal to a limit."""
 
 FREE_MOTION = "free"
 """Value of `meta["imposed"]` of a free (undriven) motion."""
@@ -101,12 +104,6 @@ def select_time_unit(recording: Recording) -> str:
     return "s" if recording.is_timed else "sample"
 
 
-def find_unit_system(recording: Recording) -> UnitSystem | None:
-    """Find the units of a model that was fitted to the recording: those of its channels; None where they are SI."""
-    system = determine_unit_system(recording.command.units, recording.response.units, select_time_unit(recording))
-    return system if system.rotational is None else None
-
-
 def is_driven(recordings: Sequence[Recording]) -> bool:
     """Whether any command changes, in or between recordings; True where no sample has all commands finite."""
     commands = np.vstack([recording.command.samples for recording in recordings])
@@ -136,3 +133,31 @@ def convert_to_force_driven(recording: Recording) -> Recording:
 def convert_all_to_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """Exchange command and response of each recording with an imposed motion (`convert_to_force_driven`)."""
     return tuple(convert_to_force_driven(recording) for recording in recordings)
+
+
+def stays_at_limit(readings: FloatArray) -> bool:
+    """Whether significantly more readings (n,) lie at the largest magnitude than at the next smaller one, as with a
+    clipped sensor. A sine that was rounded has up to 2.4 times as many there, which is below `READINGS_FACTOR`."""
+    _, top_count, next_count = count_top_readings(readings[np.isfinite(readings)])
+    return next_count > 0 and is_unusual_count(top_count, next_count)
+
+
+def count_top_readings(readings: FloatArray) -> tuple[float, int, int]:
+    """Return the largest magnitude of the readings (n,), n >= 1, the number of readings there, and the number at the
+    next smaller magnitude; 0 without one."""
+    magnitudes = np.abs(readings)
+    largest_magnitude = float(magnitudes.max())
+    is_at_limit = magnitudes >= largest_magnitude * (1 - READING_TOLERANCE)
+    smaller_magnitudes = magnitudes[~is_at_limit]
+    next_magnitude = smaller_magnitudes.max(initial=0.0) * (1 - READING_TOLERANCE)
+    return largest_magnitude, int(is_at_limit.sum()), int(np.count_nonzero(smaller_magnitudes >= next_magnitude))
+
+
+def is_unusual_count(count: int, usual_count: float) -> bool:
+    """Whether a count is at least `READINGS_LEAST` and exceeds the usual one by the factor `READINGS_FACTOR` and by
+    `READINGS_DEVIATIONS` standard deviations of a Poisson count, sqrt(usual_count)."""
+    return (
+        count >= READINGS_LEAST
+        and count > READINGS_FACTOR * usual_count
+        and count > usual_count + READINGS_DEVIATIONS * np.sqrt(usual_count)
+    )

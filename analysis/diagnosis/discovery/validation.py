@@ -274,7 +274,7 @@ def _compute_held_out_error_share(context: SearchContext, explanation: Explanati
     masks = [record.test for record in records]
     signal_rms = np.maximum(compute_signal_rms(records, masks) / context.full_measure.unit, np.finfo(float).tiny)
     law_error, retuned_error = (
-        np.sqrt(np.mean((compute_residual_rms(records, fit.fitted.residuals, masks) / signal_rms) ** 2))
+        np.sqrt(np.mean((compute_residual_rms(fit.fitted.residuals, masks) / signal_rms) ** 2))
         for fit in (law, explanation.retuned)
     )
     return float(law_error / retuned_error)

@@ -30,19 +30,42 @@ def make_evidence(
     (c,) each, in the channels' units."""
     unit, noise = scales
     filled_residuals = np.where(np.isfinite(residuals), residuals, 0.0)
-    rate_hz, response_count = record.recording.sample_rate_hz, model.outputs
     # The least rms keeps the prior positive for an axis without command.
     expected_force_n = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
-    missing_force = estimate_missing_force(model, filled_residuals, unit, rate_hz, expected_force_n)
-    measured, predicted = fill_gaps(record.measured, residuals * unit, simulated)
+    missing_force = estimate_missing_force(
+        model, filled_residuals, unit, record.recording.sample_rate_hz, expected_force_n
+    )
+    motion = (
+        simulated.axis_position + missing_force.position,
+        simulated.axis_velocity + missing_force.velocity,
+        missing_force.force,
+    )
+    return gather_evidence(model, record, simulated, residuals * unit, noise, motion)
+
+
+def gather_evidence(
+    model: MechanicalModel,
+    record: Observed,
+    simulated: SimulationResult,
+    residuals: FloatArray,
+    noise: FloatArray,
+    motion: tuple[FloatArray, FloatArray, FloatArray],
+) -> Evidence:
+    """Gather the evidence of one record. Missing samples are replaced by the simulation in the measured and in the
+    predicted signals, so that their difference is zero. residuals, noise: (n, c) and (c,), in the channels' units.
+    motion: position and velocity of the driven axes, and the missing force along them, (n, m) each."""
+    is_measured, response_count = np.isfinite(record.measured), model.outputs
+    predicted = np.hstack([simulated.response, simulated.position])[:, : is_measured.shape[1]]
+    predicted = np.where(is_measured, record.measured - residuals, predicted)
+    measured = np.where(is_measured, record.measured, predicted)
     has_position = measured.shape[1] > response_count
     return Evidence(
         model=model,
-        sample_rate_hz=rate_hz,
+        sample_rate_hz=record.recording.sample_rate_hz,
         command=record.command,
-        axis_position=simulated.axis_position + missing_force.position,
-        axis_velocity=simulated.axis_velocity + missing_force.velocity,
-        axis_force=missing_force.force,
+        axis_position=motion[0],
+        axis_velocity=motion[1],
+        axis_force=motion[2],
         response=measured[:, :response_count],
         predicted=predicted[:, :response_count],
         noise=noise[:response_count],
@@ -51,14 +74,3 @@ def make_evidence(
         predicted_position=predicted[:, response_count:] if has_position else None,
         position_noise=noise[response_count:] if has_position else None,
     )
-
-
-def fill_gaps(
-    measured: FloatArray, residuals: FloatArray, simulated: SimulationResult
-) -> tuple[FloatArray, FloatArray]:
-    """Fill gaps in the measured and predicted signals, (n, c) each: missing samples are replaced by the simulation in
-    both, so that their difference is zero. residuals: (n, c), in the channels' units."""
-    is_measured = np.isfinite(measured)
-    predicted = np.hstack([simulated.response, simulated.position])[:, : measured.shape[1]]
-    predicted = np.where(is_measured, measured - residuals, predicted)
-    return np.where(is_measured, measured, predicted), predicted

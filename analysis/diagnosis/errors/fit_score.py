@@ -52,8 +52,7 @@ def compute_fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) 
     return FitScore(
         *(
             np.maximum(
-                compute_residual_rms(measure.records, residuals, [getattr(record, role) for record in measure.records])
-                * unit_per_noise,
+                compute_residual_rms(residuals, [getattr(record, role) for record in measure.records]) * unit_per_noise,
                 measure.least_error,
             )
             for role in ("fit", "choose", "test")
@@ -83,9 +82,7 @@ def compute_signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> Floa
     return np.asarray(np.sqrt(np.mean(np.concatenate(deviations) ** 2, axis=0)))
 
 
-def compute_residual_rms(
-    records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]
-) -> FloatArray:
+def compute_residual_rms(residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:
     """Compute (c,): rms residual over the masked samples of all records; NaN where the masks are empty."""
     sum_of_squares = sum(
         np.einsum("nc,nc->c", residual[mask], residual[mask]) for residual, mask in zip(residuals, masks, strict=True)

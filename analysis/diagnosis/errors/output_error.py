@@ -202,7 +202,7 @@ def take_step(
     t = len(iterate.deviations)
     unknowns = np.concatenate([iterate.deviations, iterate.hypothesis.point])
     low, high = (bound - unknowns for bound in _list_bounds(iterate.hypothesis, tuning))
-    largest_steps = _list_largest_steps(iterate.hypothesis)
+    largest_steps = np.array([LARGEST_STEPS[unknown.parameter.scale] for unknown in iterate.hypothesis.parameters])
     low[t:], high[t:] = np.maximum(low[t:], -largest_steps), np.minimum(high[t:], largest_steps)
     next_fit, is_invalid = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
     if next_fit is None and is_invalid:
@@ -271,11 +271,6 @@ def _list_bounds(hypothesis: Hypothesis, tuning: Tuning) -> tuple[FloatArray, Fl
     limits = np.array([parameter.bounds for parameter in hypothesis.parameters]).reshape(-1, 2)
     largest_deviations = np.full(len(tuning.names), tuning.bound)
     return np.concatenate([-largest_deviations, limits[:, 0]]), np.concatenate([largest_deviations, limits[:, 1]])
-
-
-def _list_largest_steps(hypothesis: Hypothesis) -> FloatArray:
-    """List the largest step of each coordinate, by the scale of its parameter."""
-    return np.array([LARGEST_STEPS[parameter.parameter.scale] for parameter in hypothesis.parameters])
 
 
 def solve_bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motio
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_payload, apply_conditions
 from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
-from analysis.diagnosis.errors.evidence_from_residuals import fill_gaps
+from analysis.diagnosis.errors.evidence_from_residuals import gather_evidence
 from analysis.diagnosis.errors.free_simulation import stack_simulated_channels
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
 from equalizer.effects.simulation.bodies import Restarts, build_bodies
@@ -164,29 +164,14 @@ class Windows:
         """Gather the evidence of one record: motion and missing force are estimated by the smoother, driven by the
         actuators' forces and the effects' forces on the axes."""
         simulated, residual = self._simulate_from_states(model, effects, record, states)
-        recording, p = record.recording, model.outputs
+        recording = record.recording
         model = add_payload(model, recording)
         actuator_forces = compute_actuator_force(
             model, record.command, recording.sample_rate_hz, effects, recording.hold
         )
         motion = smooth_motion(model, record, actuator_forces + simulated.axis_force, self.unit)
-        measured, predicted = fill_gaps(record.measured, residual * self.unit, simulated)
-        has_position = measured.shape[1] > p
-        return Evidence(
-            model=model,
-            sample_rate_hz=recording.sample_rate_hz,
-            command=record.command,
-            axis_position=motion.axis_position,
-            axis_velocity=motion.axis_velocity,
-            axis_force=motion.missing_force,
-            response=measured[:, :p],
-            predicted=predicted[:, :p],
-            noise=self.noise[:p],
-            used=(record.fit | record.choose).astype(np.float64),
-            position=measured[:, p:] if has_position else None,
-            predicted_position=predicted[:, p:] if has_position else None,
-            position_noise=self.noise[p:] if has_position else None,
-        )
+        axis_motion = motion.axis_position, motion.axis_velocity, motion.missing_force
+        return gather_evidence(model, record, simulated, residual * self.unit, self.noise, axis_motion)
 
 
 def build_windows(

@@ -1,8 +1,8 @@
 """Detect sensor faults without a model: quantization, clipping (saturation), lost samples (repeated readings).
 
 A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
-therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`), and the usual
-quantization step.
+therefore give the usual count of such readings, which a fault must exceed significantly (`is_unusual_count`), and the
+usual quantization step.
 
 Sizes: n samples, p response channels. The limits are chosen by hand, unless a reason is stated.
 """
@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from analysis.diagnosis.data.measured_motion import READING_TOLERANCE, count_top_readings, is_unusual_count
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, make_claim_hypothesis
-from analysis.diagnosis.limits import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
+from analysis.diagnosis.limits import STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.lattice import confirm_lattice_step, find_lattice_step
@@ -28,8 +29,6 @@ FULL_STEP_SHARE = 0.75
 """Limit of the median step after a repeat, relative to the median of the other steps (`_has_full_steps`)."""
 REFERENCE_STRETCH_COUNT = 3
 """Number of stretches into which each reference recording is divided: the largest share of any stretch is usual."""
-READING_TOLERANCE = 1e-9
-"""Relative difference up to which readings count as equal to a limit."""
 
 
 def find_sensor_faults(
@@ -100,9 +99,9 @@ def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> Ch
     limit, else the one with the largest limit. readings: (n, p); references: (samples, p) each."""
     limit_by_channel = {}
     for channel in range(readings.shape[1]):
-        limit, top_count = _count_top_readings(readings[:, channel])
+        limit, top_count = _count_top_excess(readings[:, channel])
         usual_count = max(
-            _count_top_readings(reference[:, channel])[1] / len(reference) for reference in references
+            _count_top_excess(reference[:, channel])[1] / len(reference) for reference in references
         ) * len(readings)
         largest_reference = max(float(np.abs(reference[:, channel]).max()) for reference in references)
         usual_repeats = max(
@@ -110,8 +109,8 @@ def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> Ch
         ) * len(readings)
         if (
             limit < largest_reference
-            and _is_unusual(top_count, usual_count)
-            and not _is_unusual(_count_repeats_below_top(readings[:, channel]), usual_repeats)
+            and is_unusual_count(top_count, usual_count)
+            and not is_unusual_count(_count_repeats_below_top(readings[:, channel]), usual_repeats)
         ):
             limit_by_channel[channel] = limit
     are_all_clipped = bool(limit_by_channel) and bool(
@@ -120,26 +119,18 @@ def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> Ch
     return _choose_channels(limit_by_channel, are_all_clipped, readings.shape[1], "limit")
 
 
+def _count_top_excess(values: FloatArray) -> tuple[float, int]:
+    """Return the largest magnitude of one channel, (n,), and the number of readings there less the number at the next
+    smaller magnitude."""
+    limit, top_count, next_count = count_top_readings(values)
+    return limit, top_count - next_count
+
+
 def _count_repeats_below_top(values: FloatArray) -> int:
     """Count the repeated readings below the largest magnitude of one channel, (n,), n >= 2: backlash holds readings at
     any level, clipping at the limit only."""
     magnitudes = np.abs(values[1:])
     return int(np.count_nonzero((np.diff(values) == 0) & (magnitudes < magnitudes.max() * (1 - READING_TOLERANCE))))
-
-
-def _count_top_readings(values: FloatArray) -> tuple[float, int]:
-    """Return the largest magnitude of one channel, (n,), and the number of readings there less the number at the next
-    smaller magnitude."""
-    magnitudes = np.abs(values)
-    largest_magnitude = float(magnitudes.max())
-    is_at_limit = magnitudes >= largest_magnitude * (1 - READING_TOLERANCE)
-    smaller_magnitudes = magnitudes[~is_at_limit]
-    next_level_count = (
-        int(np.count_nonzero(smaller_magnitudes >= smaller_magnitudes.max() * (1 - READING_TOLERANCE)))
-        if len(smaller_magnitudes)
-        else 0
-    )
-    return largest_magnitude, int(np.count_nonzero(is_at_limit)) - next_level_count
 
 
 def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
@@ -152,7 +143,7 @@ def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -
     )
     run_count = int(_mark_run_starts(is_repeat).sum())
     if (
-        not _is_unusual(run_count, usual_count)
+        not is_unusual_count(run_count, usual_count)
         or is_repeat.sum() > LONGEST_MEAN_RUN * run_count
         or not _has_full_steps(readings, is_repeat)
     ):
@@ -183,16 +174,6 @@ def _mark_repeats(values: FloatArray) -> Mask:
 def _mark_run_starts(is_repeat: Mask) -> Mask:
     """Mark the first repeat of each run: (n - 1,)."""
     return np.asarray(is_repeat & ~np.concatenate([[False], is_repeat[:-1]]), dtype=np.bool_)
-
-
-def _is_unusual(count: int, usual_count: float) -> bool:
-    """Whether a count is at least `READINGS_LEAST` and exceeds the usual one by the factor `READINGS_FACTOR` and by
-    `READINGS_DEVIATIONS` standard deviations of a Poisson count, sqrt(usual_count)."""
-    return (
-        count >= READINGS_LEAST
-        and count > READINGS_FACTOR * usual_count
-        and count > usual_count + READINGS_DEVIATIONS * np.sqrt(usual_count)
-    )
 
 
 def _choose_channels(

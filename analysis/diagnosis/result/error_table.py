@@ -68,9 +68,7 @@ def _compute_errors(measure: ErrorMeasure, explanation: Explanation, roles: tupl
     signal_rms = np.maximum(compute_signal_rms(measure.records, masks), np.finfo(float).tiny)
 
     def compute_error(candidate: FittedCandidate) -> float | None:
-        error_ratios = (
-            compute_residual_rms(measure.records, candidate.fitted.residuals, masks) * measure.unit / signal_rms
-        )
+        error_ratios = compute_residual_rms(candidate.fitted.residuals, masks) * measure.unit / signal_rms
         mean_error = float(np.sqrt(np.mean(error_ratios**2)))
         return mean_error if np.isfinite(mean_error) else None
 

@@ -27,7 +27,6 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import WorkPart
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import SearchResult
-from equalizer.effects.effect import Values
 from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
 
@@ -123,7 +122,7 @@ def _compute_signatures(context: SearchContext, explanation: Explanation) -> tup
         )
         main_effect = max(
             fitted.hypothesis.list_effects_of(effect_index),
-            key=lambda placed_effect: _compute_strength(placed_effect.values),
+            key=lambda placed_effect: abs(next(iter(placed_effect.values.values()))),
         )
         signatures.append(
             compute_signature(evidence[record_index], full_prediction, main_effect, curve_names, recording.hold)
@@ -135,8 +134,3 @@ def _find_main_record(measure: ErrorMeasure) -> int:
     """Find the index of the record with the most samples for the fit or the choice of effects, the first of equals;
     other records may be held out entirely."""
     return int(np.argmax([np.sum(record.fit | record.choose) for record in measure.records]))
-
-
-def _compute_strength(values: Values) -> float:
-    """Compute the strength of an effect: the magnitude of the first of its values, its main parameter."""
-    return abs(next(iter(values.values())))

@@ -157,7 +157,7 @@ def keep_identifiable(context: SearchContext, explanation: Explanation, time_lef
     if len(explanation.steps) == 1 or (removed_index < len(explanation.steps) - 1 and not time_left()):
         explanation = (
             _find_replacement(context, explanation, time_left) if len(explanation.steps) == 1 else None
-        ) or _remove_effects(explanation)
+        ) or replace(explanation, after=explanation.retuned, steps=())
         return replace(explanation, undetermined=undetermined_names)
     reduced = remove_effect(context, explanation, removed_index)
     rounds = tuple(
@@ -191,11 +191,6 @@ def _find_replacement(context: SearchContext, explanation: Explanation, time_lef
         if not any(find_undetermined(context, replacement)):
             return replacement
     return None
-
-
-def _remove_effects(explanation: Explanation) -> Explanation:
-    """Remove all effects, so that the re-tuned model is the result."""
-    return replace(explanation, after=explanation.retuned, steps=())
 
 
 def _apply_profile_errors(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:

@@ -48,9 +48,7 @@ def has_unpredicted_channel(measure: ErrorMeasure, base: Fitted, fitted: Fitted)
 
 def _compute_residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
     """Compute (c,): rms residual, in each channel's own unit."""
-    return np.asarray(
-        compute_residual_rms(measure.records, fitted.residuals, _select_decision_samples(measure)) * measure.unit
-    )
+    return np.asarray(compute_residual_rms(fitted.residuals, _select_decision_samples(measure)) * measure.unit)
 
 
 def _compute_signal_rms(measure: ErrorMeasure) -> FloatArray:

@@ -96,7 +96,7 @@ class ReferenceRecording:
     def _compute_channel_rms(self, fitted: Fitted) -> FloatArray:
         """Compute (c,): rms residual on the samples to fit and to choose by, in units of `measure.unit`."""
         masks = [record.fit | record.choose for record in self.measure.records]
-        return compute_residual_rms(self.measure.records, fitted.residuals, masks)
+        return compute_residual_rms(fitted.residuals, masks)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -134,7 +134,7 @@ class SearchContext:
         held_out_masks = [record.test & ~mask for record, mask in zip(records, opened_masks, strict=True)]
         noise_units = self.full_measure.unit / self.full_measure.noise
         errors_by_mask = [
-            (compute_residual_rms(records, mismatch_fit.fitted.residuals, sample_mask) * noise_units)[[worst_channel]]
+            (compute_residual_rms(mismatch_fit.fitted.residuals, sample_mask) * noise_units)[[worst_channel]]
             for sample_mask in (opened_masks, held_out_masks)
         ]
         return all(has_held_out_mismatch(channel_errors, mismatch_fit) for channel_errors in errors_by_mask)

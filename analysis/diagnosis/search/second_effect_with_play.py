@@ -109,23 +109,20 @@ def _fit_starts(
     """Fit each start with the model's parameters fixed. Returns the fits, the least value of Akaike's criterion first,
     and whether the time sufficed for all."""
     guarded_map = context.guard.wrap(map, FITTING)
-    fit_start = partial(_fit_first, replace(weighted_problem, ensemble=1))
+    first_problem = replace(weighted_problem, ensemble=1)
     first_fits: list[BandPowerFit] = []
     is_complete = True
     for start in starts:
         is_complete = time_left()
         if not is_complete:
             break
-        first_fits += guarded_map(fit_start, [start])  # type: ignore[arg-type]
+        first_fits += guarded_map(  # type: ignore[arg-type]
+            lambda begun: fit_band_power(first_problem, begun, FIRST_FIT_STEPS), [start]
+        )
     # Akaike's criterion per compared band: cost + 2 (number of parameters) / (number of bands).
     band_count = max(int(np.count_nonzero(weighted_problem.weights)), 1)
     ranked_fits = sorted(first_fits, key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / band_count)
     return ranked_fits, is_complete
-
-
-def _fit_first(problem: BandPowerProblem, start: BandPowerFit) -> BandPowerFit:
-    """Fit a start by `FIRST_FIT_STEPS` steps."""
-    return fit_band_power(problem, start, FIRST_FIT_STEPS)
 
 
 def _refine_fits(
