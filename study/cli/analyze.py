@@ -12,7 +12,7 @@ from study.cli.results import JsonOption, print_results
 
 
 def analyze(
-    data: Annotated[Path, typer.Argument(help="Folder of sessions, one session, or a Psych-DS dataset.")],
+    data: Annotated[Path, typer.Argument(help="Folder of sessions, one session, or an export as psych-ds or csv.")],
     out: Annotated[Path | None, typer.Option(help="Where results go; default: 'analysis' in the folder.")] = None,
     ellipsoid: Annotated[
         Path | None, typer.Option(help="A recording of the ellipsoid protocol, to be added to the report.")

@@ -35,7 +35,7 @@ COMMANDS: dict[str, dict[str, str]] = {
         "show": "Print the facts of a session, a diagnosis or a recording",
         "validate": "Check files: recordings, models, protocols, tables, logs",
         "rehearse": "Let simulated participants take the whole study",
-        "export": "Write trials as Psych-DS, BIDS or MATLAB files",
+        "export": "Write trials as Psych-DS, BIDS, MATLAB or CSV files",
         "power": "Find the number of participants needed, by simulation",
         "effect": "Save a discovered law as an effect for later diagnoses",
     },

@@ -45,7 +45,8 @@ def _check_operator(operator: str | None) -> str | None:
 
 
 TimingOption = Annotated[
-    float, typer.Option(min=0, max=500, help="How long the 1 kHz loop is timed, with zero force; 0: not at all.")
+    float,
+    typer.Option(min=0, max=500, help="Seconds for which the 1 kHz loop is timed, with zero force; 0: not at all."),
 ]
 CalibrateOption = Annotated[
     bool, typer.Option("--calibrate", help="First wait until the handle is put into its calibration position.")

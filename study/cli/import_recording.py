@@ -12,10 +12,11 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.screen import print_file_text
 
 
 def import_recording(
-    files: Annotated[list[Path], typer.Argument(help="CSV, NPZ, MAT or HDF5 files, or a folder of them.")],
+    files: Annotated[list[Path], typer.Argument(help="Tables, XLSX, JSON, NPZ, NPY, MAT or HDF5 files, or a folder.")],
     out: Annotated[Path, typer.Option(help="The recording to write, REC.h5.")],
     map_name: Annotated[
         str | None,
@@ -43,7 +44,7 @@ def import_recording(
                 ImportPlan(tuple(files), map_name, out), lambda share: show_percent(round(100 * share))
             )
     except MapNeededError as error:
-        typer.echo(error.skeleton, nl=False)
+        print_file_text(error.skeleton)
         raise
     recording = import_result.recording
     if as_json:

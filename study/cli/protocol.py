@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from study.cli.command_table import Subcommands
+from study.cli.screen import print_file_text
 from study.cli.session_options import DataOption
 
 app = typer.Typer(
@@ -37,7 +38,9 @@ def list_protocols() -> None:
 @app.command("show")
 def show_protocol(
     name: NameArgument,
-    print_text: Annotated[bool, typer.Option("--text", help="The file as it is, to copy and change.")] = False,
+    print_text: Annotated[
+        bool, typer.Option("--text", help="The file, with the texts of its language filled in, to copy and change.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
 ) -> None:
     """Show every key of a protocol with its value, its default and the reason for it."""
@@ -48,7 +51,7 @@ def show_protocol(
 
     protocol_file = read_protocol(name)
     if print_text:
-        typer.echo(protocol_file.text, nl=False)
+        print_file_text(protocol_file.text)
         return
     fields = explain_protocol(protocol_file.protocol)
     if as_json:
@@ -75,7 +78,7 @@ def print_texts(
     """Print all texts that a participant reads, as a TOML file to translate, for [text] language in a protocol."""
     from study.store.formats.participant_texts import make_language_template
 
-    typer.echo(make_language_template(language), nl=False)
+    print_file_text(make_language_template(language))
 
 
 @app.command("lock")

@@ -1,6 +1,7 @@
 """Starts the full-screen interface of `hapteq study` and `hapteq resume`, and prints the results when it ends.
 
-`has_screen`, `has_keyboard` and `read_terminal_width` examine the terminal, some also for other commands.
+`has_screen`, `has_keyboard` and `read_terminal_width` examine the terminal, some also for other commands, and
+`print_file_text` prints the content of a file.
 """
 
 import os
@@ -40,6 +41,13 @@ def has_keyboard() -> bool:
 def read_terminal_width() -> int | None:
     """Read the width of the terminal on stdout, in columns; None for a file or pipe, whose lines are not wrapped."""
     return shutil.get_terminal_size().columns if sys.stdout is not None and sys.stdout.isatty() else None
+
+
+def print_file_text(text: str) -> None:
+    """Print the content of a text file on stdout: in UTF-8 where that is a file or pipe, whose own encoding could not
+    hold each character, and hapteq reads UTF-8."""
+    is_terminal = sys.stdout is not None and sys.stdout.isatty()
+    typer.echo(text if is_terminal else text.encode(), nl=False)
 
 
 def open_screen(options: "StartOptions", as_json: bool) -> None:

@@ -215,10 +215,12 @@ class FormScreen(TranslatedScreen[FormReply]):
         button.set_class(entry.field is None, "-at")
         if entry.field is None:
             button.scroll_visible(animate=False)
-        missing_count = len(find_missing_fields(entry.form, make_reply(entry)))
+        reply = make_reply(entry)
+        missing_count = len(find_missing_fields(entry.form, reply))
         counts = {"title": entry.form.title, "open": missing_count, "all": len(entry.field_entries)}
         status_text = self.words.fill("form_open" if missing_count else "form_complete", counts)
-        self.query_one("#top", LiteralText).update(status_text)
+        is_anything_left_out = not missing_count and not all(reply.answers.values())  # answers that are optional
+        self.query_one("#top", LiteralText).update(entry.form.title if is_anything_left_out else status_text)
         self.query_one("#message", LiteralText).update(_compose_message(entry, not missing_count, self.words))
         enabled_entries = [self.check_action("press", key[:2]) for key in FOOTER_ENTRIES]
         if enabled_entries != self._enabled_entries:

@@ -27,17 +27,16 @@ def compose_importing_page() -> str:
         importing_text.NOT_READ,
         "## Keys of a map",
         _format_key_section("At the top", MAP_SCHEMA),
-        *(_format_key_section(_format_table_title(name, node), _resolve_table(node)) for name, node in _list_tables()),
+        *(
+            _format_key_section(_format_table_title(name, node), table)
+            for name, node in MAP_SCHEMA["properties"].items()
+            if (table := _resolve_table(node))
+        ),
         "## Maps that come with hapteq",
         importing_text.SHIPPED_MAPS,
         _format_markdown_table(("name", "files", "what"), (_format_map_row(name) for name in list_shipped_maps())),
     ]
     return "\n\n".join(sections) + "\n"
-
-
-def _list_tables() -> list[tuple[str, Node]]:
-    """List name and schema of each table of an import map (TOML tables and lists of tables)."""
-    return [(name, node) for name, node in MAP_SCHEMA["properties"].items() if _resolve_table(node)]
 
 
 def _resolve_table(node: Node) -> Node:

@@ -18,9 +18,11 @@ from equalizer.tracking.feedforward.trajectory import TABLE_KINDS, TRAJECTORY
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.loading import ProtocolError
 from protocols.document.schema import ADAPTERS, make_protocol_schema
+from protocols.wording.english import ENGLISH
 from study.importing.map_format.import_map import ChannelMap, ComputedMap
 from study.importing.map_format.map_toml import KIND as MAP_KIND
 from study.importing.map_format.map_toml import is_map, parse_map
+from study.session.views.count_text import format_count
 from study.store.disk.csv_rows import find_header_problem
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats import calibration_file, identified_model_file, recording_layout
@@ -30,7 +32,7 @@ from study.store.formats.daily_check_file import read_daily_check
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
-from study.store.formats.participant_texts import load_in_language
+from study.store.formats.participant_texts import load_in_language, read_language
 from study.store.formats.real_answer_file import read_real_answer
 from study.store.formats.recording_file import read_recording
 from study.store.formats.repeats_file import FORMAT as REPEATS_FORMAT
@@ -61,15 +63,15 @@ def describe_recording(recording: Recording) -> str:
     """Describe duration, sample rate, and the numbers of channels and segments of a recording."""
     parts = [
         f"{recording.response.duration_s:g} s at {recording.sample_rate_hz:g} Hz",
-        _format_count(len(recording.command.channels), "command"),
-        _format_count(len(recording.response.channels), "response"),
+        format_count(len(recording.command.channels), "command"),
+        format_count(len(recording.response.channels), "response"),
     ]
     if recording.position is not None:
-        parts.append(_format_count(len(recording.position.channels), "position"))
+        parts.append(format_count(len(recording.position.channels), "position"))
     if recording.condition is not None:
-        parts.append(_format_count(len(recording.condition.channels), "condition"))
+        parts.append(format_count(len(recording.condition.channels), "condition"))
     if recording.segments:
-        parts.append(_format_count(len(recording.segments), "segment"))
+        parts.append(format_count(len(recording.segments), "segment"))
     return ", ".join(parts)
 
 
@@ -83,8 +85,8 @@ def recognise_identified_model(content: FileContent) -> str | None:
     )
     return (
         f"identified model of order {model.order}, {model.band_hz[0]:g} to {model.band_hz[1]:g} Hz at "
-        f"{model.sample_rate_hz:g} Hz, {_format_count(len(model.input_channels), 'input')}, "
-        f"{_format_count(len(model.output_channels), 'output')}, {stability_text}, {write_quality_brief(model.quality)}"
+        f"{model.sample_rate_hz:g} Hz, {format_count(len(model.input_channels), 'input')}, "
+        f"{format_count(len(model.output_channels), 'output')}, {stability_text}, {write_quality_brief(model.quality)}"
     )
 
 
@@ -95,7 +97,7 @@ def recognise_calibration(content: FileContent) -> str | None:
     calibration = read_calibration(content.path)
     return (
         f"calibration of the linkage of {calibration.device}, "
-        f"{_format_count(len(calibration.position_m), 'position')}, {int(calibration.filled.sum())} of them filled in, "
+        f"{format_count(len(calibration.position_m), 'position')}, {int(calibration.filled.sum())} of them filled in, "
         f"mirrored inertia within {calibration.asymmetry.max():.1%}"
     )
 
@@ -107,8 +109,8 @@ def recognise_mechanical_model(content: FileContent) -> str | None:
     model = read_mechanical_model(content.path)
     effects_text = ", ".join(effect.kind for effect in model.effects) or "no effects"
     return (
-        f"mechanical model '{model.name}', {_format_count(model.coordinates, 'coordinate')}, "
-        f"{_format_count(model.inputs, 'input')}, {_format_count(model.outputs, 'output')} ({model.quantity}), "
+        f"mechanical model '{model.name}', {format_count(model.coordinates, 'coordinate')}, "
+        f"{format_count(model.inputs, 'input')}, {format_count(model.outputs, 'output')} ({model.quantity}), "
         f"{effects_text}"
     )
 
@@ -122,8 +124,8 @@ def recognise_import_map(content: FileContent) -> str | None:
     if problems := tuple(problem for channel in channels if (problem := _find_unit_problem(channel))):
         raise UnusableFileError(content.path, MAP_KIND, problems)
     return (
-        f"import map for {import_map.device}: {_format_count(len(channels), 'channel')}, "
-        f"{_format_count(len(import_map.clock), 'clock')}"
+        f"import map for {import_map.device}: {format_count(len(channels), 'channel')}, "
+        f"{format_count(len(import_map.clock), 'clock')}"
     )
 
 
@@ -153,6 +155,15 @@ def recognise_protocol(content: FileContent) -> str | None:
     return f"{kind} protocol '{protocol.name}': {protocol.title}"
 
 
+def recognise_texts(content: FileContent) -> str | None:
+    """Recognise a table of texts for participants, such as a translation, in TOML by any of its keys. Raises
+    UnusableFileError also for texts that are missing."""
+    if not (content.toml or {}).keys() & ENGLISH.keys():
+        return None
+    _, table = read_language(str(content.path.absolute()))
+    return f"table of texts for participants, {format_count(len(table), 'text')}"
+
+
 def recognise_diagnosis(content: FileContent) -> str | None:
     """Recognise a diagnosis in JSON by its `format` entry."""
     if content.json_format != DIAGNOSIS_FORMAT:
@@ -180,7 +191,7 @@ def recognise_repeats(content: FileContent) -> str | None:
         return None
     repeats = read_repeats(content.path)
     return (
-        f"repeats, {_format_count(len(repeats.errors), 'play')}, error {repeats.errors[0]:.2%} to "
+        f"repeats, {format_count(len(repeats.errors), 'play')}, error {repeats.errors[0]:.2%} to "
         f"{repeats.errors[repeats.kept]:.2%}, noise {repeats.noise_floor:.2%}"
     )
 
@@ -199,7 +210,7 @@ def recognise_reproduction(content: FileContent) -> str | None:
         return None
     reproduction = read_reproduction(content.path)
     return (
-        f"reproduction of {_format_count(len(reproduction.figures), 'figure')} on the {reproduction.device}, "
+        f"reproduction of {format_count(len(reproduction.figures), 'figure')} on the {reproduction.device}, "
         f"seed {reproduction.seed}"
     )
 
@@ -224,7 +235,7 @@ def recognise_trials(content: FileContent) -> str | None:
     # of thresholds also begin with the subject.
     if content.header[:2] != TRIALS_HEADER[:2] and find_header_problem(content.header, TRIALS_HEADER):
         return None
-    return f"table of {_format_count(len(read_trials(content.path)), 'trial')}"
+    return f"table of {format_count(len(read_trials(content.path)), 'trial')}"
 
 
 def recognise_thresholds(content: FileContent) -> str | None:
@@ -232,12 +243,7 @@ def recognise_thresholds(content: FileContent) -> str | None:
     if content.header[:2] != THRESHOLDS_HEADER[:2] and find_header_problem(content.header, THRESHOLDS_HEADER):
         return None
     noun = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"
-    return f"table of {_format_count(len(read_thresholds(content.path)), noun)}"
-
-
-def _format_count(number: int, noun: str) -> str:
-    """Format a number and its noun, in the plural unless the number is 1."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f"table of {format_count(len(read_thresholds(content.path)), noun)}"
 
 
 RECOGNISERS: tuple[Recogniser, ...] = (
@@ -255,5 +261,6 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_thresholds,
     recognise_import_map,
     recognise_protocol,
+    recognise_texts,
 )
 """Recognisers in the order in which they are tried; the first that returns a kind decides."""

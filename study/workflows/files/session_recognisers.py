@@ -67,6 +67,12 @@ DOCUMENT_KINDS = {
     REQUEST_FORMAT: DocumentKind("request to a running session", REQUEST_VERSION, ("request", "who")),
     WITHDRAWAL_FORMAT: DocumentKind("withdrawal that was begun", WITHDRAWAL_VERSION, ()),
     TOMBSTONE_FORMAT: DocumentKind("tombstone of a withdrawn session", TOMBSTONE_VERSION, ("session", "withdrawn_utc")),
+    # Of results: their modules load slowly, or may not be imported here.
+    "hapteq-acceptance": DocumentKind("acceptance of a device", 1, ("device", "details", "operator", "accepted_on")),
+    "hapteq-contact": DocumentKind("played contact", 1, ("normal", "band_hz", "measured_error", "model_sha256")),
+    "hapteq-power": DocumentKind("power of a study", 1, ("plan", "judged_hz", "points")),
+    "hapteq-bank": DocumentKind("settings of a blind test", 1, ("seed", "brief")),
+    "hapteq-proof": DocumentKind("blind test of the diagnosis", 1, ("provenance",)),
 }
 """Kinds of JSON documents, by their `format` entry."""
 

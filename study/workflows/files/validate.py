@@ -26,9 +26,9 @@ from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
 from study.workflows.recording.read_any_recording import HAPTEQ_PREFIX
 
 KNOWN_KINDS = (
-    "known are recordings, identified models and calibrations (HDF5), mechanical models, protocols and import maps "
-    "(TOML), trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and "
-    "version, and session folders"
+    "known are recordings, identified models and calibrations (HDF5), mechanical models, protocols, tables of texts "
+    "and import maps (TOML), trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents "
+    "with format and version, and session folders"
 )
 """List of the kinds that `hapteq validate` recognises, for messages."""
 
@@ -177,5 +177,5 @@ def _explain_toml(content: FileContent) -> str:
     keys = ", ".join(content.toml or ())
     return (
         f"its keys ({keys}) are neither those of a mechanical model ([model] ...) nor of a protocol (kind = ...) nor "
-        "of an import map ([[channel]] ...)"
+        "of an import map ([[channel]] ...) nor of a table of texts (yes = ...)"
     )

@@ -1,12 +1,15 @@
 """The command line as a script would use it: exit codes, stdout for results, stderr for talk."""
 
+import io
 import json
+import sys
 
 import pytest
 
 from study.cli.main import main
 from study.errors import ExitCode
-from study.store.formats.protocol_files import list_shipped_protocols
+from study.store.formats.participant_texts import make_language_template
+from study.store.formats.protocol_files import list_shipped_protocols, read_protocol
 
 pytestmark = pytest.mark.usefixtures("validated_here")
 
@@ -69,6 +72,21 @@ def test_protocols_are_listed_and_explained(run):
     assert {field["key"] for field in json.loads(out)["fields"]} >= {"staircase.start_n", "trial.feedback"}
     code, out, _ = run("protocol", "show", "sweep", "--text")
     assert out.startswith("#")
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        (["texts", "de"], lambda: make_language_template("de")),
+        (["show", "direction_threshold", "--text"], lambda: read_protocol("direction_threshold").text),
+    ],
+)
+def test_what_is_printed_to_be_a_file_is_in_utf_8_on_any_system(monkeypatch, command, text):
+    out = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(out, encoding="cp1252"))
+    assert main(["protocol", *command]) == 0
+    sys.stdout.flush()
+    assert out.getvalue().decode("utf-8") == text()
 
 
 @pytest.mark.slow

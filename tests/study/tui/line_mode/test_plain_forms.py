@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from study.devices.clock import RealClock
+from protocols.wording.words import Words
+from study.devices.clock import RealClock, VirtualClock
 from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
 from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.tui.line_mode.line_input import LineInput
@@ -157,6 +158,17 @@ def test_a_changed_answer_to_an_exclusion_is_read_back_before_it_counts(typed):
     assert typed.display.fill_in(exclusion).answers == {"hands": "yes", "arm": "no"}
     assert "You changed an answer. Your answers are now: 1 no, 2 no." in typed.said
     assert "You changed an answer. Your answers are now: 1 yes, 2 no." in typed.said
+
+
+@pytest.mark.parametrize("line", ["O", "o", "Oui", "oui"])
+def test_the_letter_and_the_word_of_a_translation_confirm_in_either_case(line):
+    read, write = os.pipe()
+    out, words = io.StringIO(), Words({"yes": "Oui", "line_form_confirm_letter": "O"})
+    display = PlainDisplay(LineInput(read), out, VirtualClock(), words=words)
+    os.write(write, f"1\nb\n2\n1\n{line}\nb\n2\n1\n".encode())
+    consent = replace(form(CONSENT, replace(CONSENT, key="arm")), kind=FormKind.CONSENT)
+    assert display.fill_in(consent).answers == {"hands": "no", "arm": "yes"}
+    assert "is no answer" not in out.getvalue()
 
 
 def test_lines_typed_ahead_of_a_refusal_answer_no_other_question():

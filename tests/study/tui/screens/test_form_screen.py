@@ -96,6 +96,12 @@ def test_a_form_says_how_much_is_open_and_when_it_is_done(filled):
     assert "everything is answered" in words and "Go down to Continue" in words
 
 
+def test_optional_questions_without_an_answer_are_not_called_answered(filled):
+    form = Form(FormKind.QUESTIONNAIRE, "About you", "", (FormField("age", "How old are you?", needed=False),))
+    assert "is answered" not in filled(form)[1]
+    assert "About you: everything is answered" in filled(form, *"28")[1]
+
+
 def test_version_and_ethics_id_are_shown(filled):
     assert "Version 2. Ethics approval EC 7." in filled(THREE)[1]
 

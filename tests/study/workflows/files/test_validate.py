@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import h5py
@@ -20,6 +21,7 @@ from study.store.formats.protocol_files import list_shipped_protocols, read_stud
 from study.store.formats.recording_file import write_recording
 from study.store.formats.thresholds_file import write_thresholds
 from study.store.sessions.event_log import LOG_NAME
+from study.tui.themes import NEXT_THEME
 from study.workflows.files.file_content import FileContent
 from study.workflows.files.recognisers import RECOGNISERS
 from study.workflows.files.validate import validate_file
@@ -98,6 +100,29 @@ def test_a_protocol_in_a_language_is_sound_as_its_file_is_read(tmp_path, small_t
     assert sound(written(tmp_path / "study.toml", asked)).startswith("study protocol 'small': ")
     lost = validate_file(written(tmp_path / "lost.toml", asked.replace(language, "nowhere.toml")))
     assert "nowhere.toml" in " ".join(lost.problems)
+
+
+def test_each_document_that_hapteq_writes_is_known(tmp_path):
+    study = Path(__file__).parents[4] / "study"
+    stated = {
+        name for path in study.rglob("*.py") for name in re.findall(r'"(hapteq-[a-z-]+)"', path.read_text("utf-8"))
+    }
+    in_hdf5 = {"hapteq-recording", "hapteq-model", "hapteq-calibration"}
+    documents = stated - in_hdf5 - {"hapteq-", *NEXT_THEME, SESSION_FORMAT}
+    unknown = []
+    for name in sorted(documents):
+        found = validate_file(written(tmp_path / "a.json", f'{{"format": "{name}", "version": 1}}'))
+        unknown += [name for problem in found.problems if "is not known here" in problem]
+    assert len(documents) > 12
+    assert unknown == []
+
+
+def test_a_table_of_texts_is_checked_as_a_protocol_that_names_it_would(tmp_path):
+    text = make_language_template("de")
+    assert sound(written(tmp_path / "fr.toml", text)).startswith("table of texts for participants, ")
+    found = validate_file(written(tmp_path / "gap.toml", text.replace("\nyes = ", "\nyess = ")))
+    assert found.kind == "table of texts"
+    assert [problem.split(" ")[0] for problem in found.problems] == ["yess", "yes"]
 
 
 def test_a_table_is_known_by_its_header_under_any_name(tmp_path):
