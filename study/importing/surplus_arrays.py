@@ -108,10 +108,11 @@ def find_rates(arrays: Arrays) -> Mapping[str, str]:
     }
 
 
-def read_factor(name: str, si: str) -> float | None:
-    """Read the factor from the unit in a name, in brackets or at its end, to an SI unit; None without such a unit."""
+def read_factor(name: str, si: str, in_brackets: bool = False) -> float | None:
+    """Read the factor from the unit in a name, in brackets or, unless `in_brackets`, at its end, to an SI unit; None
+    without such a unit."""
     try:
-        unit = parse_unit(split_bracketed_unit(name)[1] or split_unit_at_end(name)[1])
+        unit = parse_unit(split_bracketed_unit(name)[1] or ("" if in_brackets else split_unit_at_end(name)[1]))
     except UnknownUnitError:
         return None
     return unit.factor if unit.si == si else None
@@ -136,7 +137,7 @@ def find_equal_clocks(arrays: Arrays) -> Mapping[str, str]:
     kept_clocks: list[str] = []
     repeated_clocks = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
-    for name in sorted(clocks, key=lambda name: (_read_unit_s(name) is None, name not in arrays.clocks)):
+    for name in sorted(clocks, key=lambda name: (read_factor(name, "s", True) is None, name not in arrays.clocks)):
         equal_clock = next(
             (kept_clock for kept_clock in kept_clocks if _is_same_clock(arrays.by_name, kept_clock, name)), None
         )
@@ -176,17 +177,8 @@ def _is_same_clock(by_name: Mapping[str, Array], first_name: str, second_name: s
     ):
         return False
     first_times, second_times = first_times - first_times[0], second_times - second_times[0]
-    units = _read_unit_s(first_name), _read_unit_s(second_name)
+    units = read_factor(first_name, "s", True), read_factor(second_name, "s", True)
     ratios = _USUAL_UNIT_RATIOS if None in units else ((units[1] or 1) / (units[0] or 1),)
     ratio = min(ratios, key=lambda ratio: abs(second_times[-1] * ratio - first_times[-1]))
     median_step = float(np.nanmedian(np.diff(first_times)))
     return bool(np.nanmax(np.abs(second_times * ratio - first_times)) <= SAME_CLOCK_TOLERANCE * median_step)
-
-
-def _read_unit_s(name: str) -> float | None:
-    """Read the factor from the unit in brackets to seconds; None without a unit of time."""
-    try:
-        unit = parse_unit(split_bracketed_unit(name)[1])
-    except UnknownUnitError:
-        return None
-    return unit.factor if unit.si == "s" else None

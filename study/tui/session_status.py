@@ -4,6 +4,7 @@ The word differs between states, so that the status can be read without seeing c
 """
 
 from study.session.views.archive_views import INELIGIBILITY_REASONS, SessionLine, SessionStatus
+from study.session.views.count_text import format_count
 
 SYMBOLS: dict[SessionStatus, str] = {
     "finished": "✓",
@@ -34,16 +35,12 @@ def format_status(status: SessionStatus) -> str:
 
 def describe_session(session: SessionLine) -> str:
     """Describe the status of a session in words; for an unfinished or running one, also what can be done with it."""
+    run_count, answer_count = format_count(session.runs, "run"), format_count(session.answers, "answer")
     match session.standing:
         case "finished":
-            return (
-                f"{_format_session_name(session)} finished all {_format_run_count(session.runs)} "
-                f"with {_format_answer_count(session)}."
-            )
+            return f"{_format_session_name(session)} finished all {run_count} with {answer_count}."
         case "unfinished":
-            progress_text = (
-                f"{session.runs_done} of {_format_run_count(session.runs)} done, {_format_answer_count(session)}"
-            )
+            progress_text = f"{session.runs_done} of {run_count} done, {answer_count}"
             device_text = f" on the {session.device}" if session.device else ""
             return f"{_format_session_name(session)} is not finished: {progress_text}. It can be resumed{device_text}."
         case "running":
@@ -59,11 +56,3 @@ def describe_session(session: SessionLine) -> str:
 def _format_session_name(session: SessionLine) -> str:
     """Format the name of a session, with its simulated participant if it has one."""
     return f"{session.name}{f' (simulated: {session.observer})' if session.observer else ''}"
-
-
-def _format_answer_count(session: SessionLine) -> str:
-    return f"{session.answers} answer{'' if session.answers == 1 else 's'}"
-
-
-def _format_run_count(run_count: int) -> str:
-    return f"{run_count} run{'' if run_count == 1 else 's'}"

@@ -33,6 +33,7 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.views.archive_views import INELIGIBILITY_REASONS
+from study.session.views.count_text import format_count
 from study.session.views.local_time import Zone, split_time_in_zone, to_utc
 
 _PresentationKey = tuple[int, int, int]
@@ -210,12 +211,11 @@ def _describe_form(event: FormFilled) -> str:
                 else "The questions on the set-up were asked."
             )
         case "questionnaire":
-            question_count = _format_count(len(event.answers), "question")
+            question_count = format_count(len(event.answers), "question")
             return f"Before the trials: {question_count} answered; the answers stay in the log file."
         case "debrief":
-            return (
-                f"Debrief: {_format_count(len(event.answers), 'question')} answered; the answers stay in the log file."
-            )
+            question_count = format_count(len(event.answers), "question")
+            return f"Debrief: {question_count} answered; the answers stay in the log file."
 
 
 def _describe_device(device: DeviceFacts) -> str:
@@ -238,11 +238,6 @@ def _format_seconds(seconds: float) -> str:
     if seconds < 120:
         return f"{seconds:.3g} s"
     return f"{seconds / 60:.0f} min"
-
-
-def _format_count(number: int, noun: str) -> str:
-    """Format a number with its noun, in the plural unless the number is 1."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _join_lines(text: str) -> str:

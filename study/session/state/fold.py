@@ -36,7 +36,6 @@ from study.session.state.presentation_check import LogContradictionError
 from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, apply_break, begin_probe, end_probe
 from study.session.state.rules import is_place_assigned_later
 from study.session.state.sitting_state import (
-    SittingState,
     add_exposure,
     apply_device_check,
     apply_form,
@@ -56,7 +55,8 @@ def apply_event(state: SessionState, event: Event) -> SessionState:
         raise LogContradictionError(f"{event.event} after the session was closed")
     if state.is_finally_ineligible and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
         raise LogContradictionError(f"{event.event} of a person who does not take part")
-    state = replace(state, sitting=_advance_time(state.sitting, event))
+    moment = Moment(event.utc, event.monotonic_s)
+    state = replace(state, sitting=pass_time(state.sitting, moment, resumed=isinstance(event, SessionResumed)))
     match event:
         case TrialPresented():
             return present_trial(state, event)
@@ -68,11 +68,6 @@ def apply_event(state: SessionState, event: Event) -> SessionState:
             return spoil_trial(state, event)
         case _:
             return _apply_between_trials(state, event)
-
-
-def _advance_time(sitting: SittingState, event: Event) -> SittingState:
-    """Advance the sitting to the time of the event: elapsed times, dose and rest."""
-    return pass_time(sitting, Moment(event.utc, event.monotonic_s), resumed=isinstance(event, SessionResumed))
 
 
 def _apply_between_trials(state: SessionState, event: Event) -> SessionState:

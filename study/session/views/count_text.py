@@ -1,7 +1,9 @@
-"""Number of answers with the form of the verb that agrees with it, for messages at the end of a sitting.
+"""Numbers with a noun in the form that agrees with them, for messages."""
 
-Called by `run_session`, `resume_session` and `end_sitting` of `study.workflows.session`.
-"""
+
+def format_count(number: int, noun: str) -> str:
+    """Format a number with its noun, in the plural unless the number is 1."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def format_answer_count(answer_count: int) -> str:

@@ -58,7 +58,7 @@ def make_watch_view(
         standing=status,
         reason=_describe_reason(session, status),
         activity=activity,
-        activity_s=situation.open_s or _compute_seconds_between(since_utc, now_utc),
+        activity_s=situation.open_s or max(0.0, compute_wall_clock_s(since_utc, now_utc)),  # 0: clocks differ
         runs=tuple(make_watched_run(state, run) for run in state.runs),
         shown_run=shown_run,
         points=collect_staircase_points(state, shown_run),
@@ -185,8 +185,3 @@ def _advance_to_now(sitting: SittingState, live_state: LiveState | None, now_utc
     if live_state is not None and has_monotonic_time:
         return pass_time(sitting, Moment(live_state.utc, live_state.monotonic_s))
     return pass_time(sitting, Moment(now_utc))
-
-
-def _compute_seconds_between(since_utc: str, now_utc: str) -> float:
-    """Compute the seconds between two times; 0 instead of a negative value, which clocks of two computers can give."""
-    return max(0.0, compute_wall_clock_s(since_utc, now_utc))

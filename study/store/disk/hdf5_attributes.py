@@ -10,6 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from study.store.disk.strict_json import load_json
+
 _MAX_ENTRIES = 1000
 """Largest number of entries of an attribute that is read. Chosen: bounds the memory of a damaged file."""
 _MAX_SHOWN_CHARACTERS = 100
@@ -66,6 +68,18 @@ def read_numbers_attribute(
             f"{_describe_attribute(owner, name)} is {_shorten_value(stored_value)}; it must be {expected}"
         )
     return tuple(float(value) for value in values)
+
+
+def read_provenance_attribute(file: Any) -> dict[str, Any]:
+    """Read the attribute `provenance`; empty if it is missing. Raises ValueError if it is not a JSON object."""
+    text = read_text_attribute(file, "provenance", "{}")
+    try:
+        provenance = load_json(text)
+    except ValueError as error:
+        raise ValueError(f"the attribute 'provenance' is not JSON: {error}") from error
+    if not isinstance(provenance, dict):
+        raise ValueError(f"the attribute 'provenance' is {provenance!r}; it must be a JSON object")
+    return provenance
 
 
 def collapse_single_text(texts: tuple[str, ...]) -> str | tuple[str, ...]:

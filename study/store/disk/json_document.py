@@ -4,15 +4,19 @@ Documents are written atomically; numbers are finite (`strict_json`).
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from equalizer.signals.listed_problems import ListedProblemsError
 from study.regular_file import MAX_DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.provenance import Provenance
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
+
+Content = TypeVar("Content")
+"""Content of a document."""
 
 
 def write_json(
@@ -55,6 +59,19 @@ def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
         reason = f"its version is {_describe_value(stored_version)}; this program reads version {version}"
         raise UnusableFileError(path, format_name, (reason,))
     return document
+
+
+def read_content(
+    path: Path, format_name: str, version: int, kind: str, parse: Callable[[dict[str, Any]], Content]
+) -> Content:
+    """Read the content of a document without its provenance, by `parse`, which raises ListedProblemsError for invalid
+    content. kind: name of such files in messages. Raises as `read_json`, and UnusableFileError for invalid content."""
+    document = read_json(path, format_name, version)
+    document.pop("provenance", None)
+    try:
+        return parse(document)
+    except ListedProblemsError as error:
+        raise UnusableFileError(path, kind, error.problems) from error
 
 
 def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:

@@ -13,10 +13,9 @@ import numpy as np
 from equalizer.linkage.calibration import CalibrationError, LinkageCalibration
 from equalizer.signals.signal import FloatArray
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.hdf5_attributes import read_numbers_attribute, read_text_attribute
+from study.store.disk.hdf5_attributes import read_numbers_attribute, read_provenance_attribute, read_text_attribute
 from study.store.disk.hdf5_file import ProblemCollector, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.layout import Entry
-from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-calibration", 1
 """Name and version of the format, written into every file."""
@@ -103,7 +102,7 @@ def _read_fields(file: Any, problems: ProblemCollector) -> dict[str, Any]:
         """Read an attribute of `count` numbers; zeros where it is wrong."""
         return np.array(problems.attempt(lambda: read_numbers_attribute(file, name, count), (0.0,) * count))
 
-    provenance: dict[str, Any] = problems.attempt(lambda: _read_provenance(file), {})
+    provenance: dict[str, Any] = problems.attempt(lambda: read_provenance_attribute(file), {})
     return {
         **{name: read_text(name) for name in ("device", "details", "read_on")},
         **{name: read_array(name) for name in ARRAY_NAMES},
@@ -111,11 +110,3 @@ def _read_fields(file: Any, problems: ProblemCollector) -> dict[str, Any]:
         "difference": float(read_numbers("difference", 1)[0]),
         "provenance": provenance,
     }
-
-
-def _read_provenance(file: Any) -> dict[str, Any]:
-    """Read the attribute `provenance`, empty if missing. Raises ValueError where it is not a JSON object."""
-    provenance = load_json(read_text_attribute(file, "provenance", "{}"))
-    if not isinstance(provenance, dict):
-        raise ValueError("the attribute 'provenance' must be a JSON object")
-    return provenance

@@ -4,18 +4,9 @@ This module reads and writes the file; `analysis.diagnosis.document` defines and
 """
 
 from pathlib import Path
-from typing import Any
 
-from analysis.diagnosis.document import (
-    FORMAT,
-    VERSION,
-    Diagnosis,
-    DiagnosisError,
-    diagnosis_from_json,
-    diagnosis_to_json,
-)
-from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.json_document import read_json, write_json
+from analysis.diagnosis.document import FORMAT, VERSION, Diagnosis, diagnosis_from_json, diagnosis_to_json
+from study.store.disk.json_document import read_content, write_json
 from study.store.disk.provenance import Provenance
 
 DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "report.html"
@@ -25,12 +16,7 @@ DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "repo
 def read_diagnosis(path: Path) -> Diagnosis:
     """Read a diagnosis, without its provenance. Raises CannotReadError where the file cannot be read, UnusableFileError
     where it has another format or version, or invalid content."""
-    document: dict[str, Any] = read_json(path, FORMAT, VERSION)
-    document.pop("provenance", None)
-    try:
-        return diagnosis_from_json(document)
-    except DiagnosisError as error:
-        raise UnusableFileError(path, "diagnosis", error.problems) from error
+    return read_content(path, FORMAT, VERSION, "diagnosis", diagnosis_from_json)
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None) -> None:

@@ -18,13 +18,12 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.hdf5_attributes import (
     collapse_single_text,
     read_numbers_attribute,
-    read_text_attribute,
+    read_provenance_attribute,
     read_texts_attribute,
     write_texts,
 )
 from study.store.disk.hdf5_file import ProblemCollector, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.layout import Entry
-from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-model", 1
 """Name and version of the format, as attributes of the file."""
@@ -162,7 +161,7 @@ def _read_model_fields(file: Any, problems: ProblemCollector) -> dict[str, Any]:
         """Read `count` numbers of an attribute; zeros after a problem."""
         return problems.attempt(lambda: read_numbers_attribute(file, name, count, default), (0.0,) * count)
 
-    provenance: dict[str, Any] = problems.attempt(lambda: _read_provenance(file), {})
+    provenance: dict[str, Any] = problems.attempt(lambda: read_provenance_attribute(file), {})
     optional_matrices = [name for name in ("covariance", "samples") if name in file]
     return {
         **{name: read_matrix(name) for name in ("A", "B", "C", "D", *optional_matrices)},
@@ -175,15 +174,3 @@ def _read_model_fields(file: Any, problems: ProblemCollector) -> dict[str, Any]:
         "provenance": provenance,
         "quality": problems.attempt(lambda: _read_quality(file), None),
     }
-
-
-def _read_provenance(file: Any) -> dict[str, Any]:
-    """Read the provenance; empty if the file has none. Raises ValueError if it is not a JSON object."""
-    text = read_text_attribute(file, "provenance", "{}")
-    try:
-        provenance = load_json(text)
-    except ValueError as error:
-        raise ValueError(f"the attribute 'provenance' is not JSON: {error}") from error
-    if not isinstance(provenance, dict):
-        raise ValueError(f"the attribute 'provenance' is {provenance!r}; it must be a JSON object")
-    return provenance

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import CsvError, format_csv_table, list_columns, parse_csv_table
+from study.store.disk.csv_rows import format_csv_table, list_columns
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
-from study.store.formats.trials_file import find_trial_problems
+from study.store.formats.trials_file import read_trials
 
 DESCRIPTION_NAME = "dataset_description.json"
 """Name of the dataset's description, as the standard sets it."""
@@ -118,20 +118,8 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
             else f"the key '{FACTS_KEY}' is missing"
         )
         raise UnusableFileError(path, KIND, (problem,))
-    trials = tuple(trial for file_path in files for trial in read_described_trials(file_path, KIND))
+    trials = tuple(trial for file_path in files for trial in read_trials(file_path, KIND))
     return ExportedTrials(trials, read_text(folder / PROTOCOL_PATH), facts, files)
-
-
-def read_described_trials(path: Path, kind: str) -> tuple[Trial, ...]:
-    """Read the trials of a CSV table. kind: name of the kind of dataset for messages. Raises CannotReadError where the
-    table cannot be read, UnusableFileError where columns or values are invalid, or the trials contradict each other."""
-    try:
-        rows = parse_csv_table(read_text(path), Trial)
-    except CsvError as error:
-        raise UnusableFileError(path, kind, error.problems) from error
-    if trial_problems := find_trial_problems(rows):
-        raise UnusableFileError(path, kind, trial_problems)
-    return tuple(rows)
 
 
 def _describe_variable(column: str, description: str, unit: str) -> dict[str, str]:

@@ -5,18 +5,15 @@ version and provenance.
 """
 
 from pathlib import Path
-from typing import Any
 
 from analysis.evaluation.reproduction.document import (
     FORMAT,
     VERSION,
     Reproduction,
-    ReproductionError,
     reproduction_from_json,
     reproduction_to_json,
 )
-from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.json_document import read_json, write_json
+from study.store.disk.json_document import read_content, write_json
 from study.store.disk.provenance import Provenance
 
 REPRODUCTION_NAME = "reproduction.json"
@@ -26,12 +23,7 @@ REPRODUCTION_NAME = "reproduction.json"
 def read_reproduction(path: Path) -> Reproduction:
     """Read the document, without its provenance. Raises CannotReadError where the file cannot be read,
     UnusableFileError where it has another format or version, or invalid content."""
-    document: dict[str, Any] = read_json(path, FORMAT, VERSION)
-    document.pop("provenance", None)
-    try:
-        return reproduction_from_json(document)
-    except ReproductionError as error:
-        raise UnusableFileError(path, "reproduction", error.problems) from error
+    return read_content(path, FORMAT, VERSION, "reproduction", reproduction_from_json)
 
 
 def write_reproduction(path: Path, reproduction: Reproduction, provenance: Provenance | None = None) -> None:

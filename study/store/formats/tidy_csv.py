@@ -16,8 +16,9 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.answer_table import AnswerTable
-from study.store.formats.psych_ds import ExportedTrials, read_described_trials
+from study.store.formats.psych_ds import ExportedTrials
 from study.store.formats.trial_columns import TRIAL_COLUMNS
+from study.store.formats.trials_file import read_trials
 
 TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "dictionary.csv", "protocol.toml", "facts.json"
 """Names of the files of every export."""
@@ -72,6 +73,4 @@ def read_tidy_csv(folder: Path) -> ExportedTrials:
     if not isinstance(facts, dict):
         raise UnusableFileError(facts_path, KIND, ("it is no JSON object",))
     trials_path = folder / TRIALS_NAME
-    return ExportedTrials(
-        read_described_trials(trials_path, KIND), read_text(folder / PROTOCOL_NAME), facts, (trials_path,)
-    )
+    return ExportedTrials(read_trials(trials_path, KIND), read_text(folder / PROTOCOL_NAME), facts, (trials_path,))

@@ -26,16 +26,16 @@ def write_trials(path: Path, trials: Iterable[Trial]) -> None:
     write_text(path, format_csv_table(trials, Trial), overwrite=True)
 
 
-def read_trials(path: Path | str) -> tuple[Trial, ...]:
-    """Read the table. Raises CannotReadError where the file cannot be read, and UnusableFileError where it is not a
-    table of trials or where `find_trial_problems` finds a problem."""
+def read_trials(path: Path | str, kind: str = KIND) -> tuple[Trial, ...]:
+    """Read the table. kind: name of such files in messages. Raises CannotReadError where the file cannot be read, and
+    UnusableFileError where it is not a table of trials or where `find_trial_problems` finds a problem."""
     path = Path(path)
     try:
         trials = parse_csv_table(read_text(path), Trial)
     except CsvError as error:
-        raise UnusableFileError(path, KIND, error.problems) from error
+        raise UnusableFileError(path, kind, error.problems) from error
     if problems := find_trial_problems(trials):
-        raise UnusableFileError(path, KIND, problems)
+        raise UnusableFileError(path, kind, problems)
     return trials
 
 

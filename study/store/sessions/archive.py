@@ -188,6 +188,12 @@ def parse_session_number(name: str) -> int:
     return int(match["number"]) if match else 0
 
 
+def is_session_name(name: str, subject: str) -> bool:
+    """Whether the name is that of a session folder of this participant."""
+    match = FOLDER_PATTERN.fullmatch(name)
+    return match is not None and match["subject"] == subject
+
+
 def require_single_folder(session: str, data: Path) -> None:
     """Raise WrongUseError where both the current folder and the data folder hold a folder of this name: a command must
     not change, or erase, the session of another study. `.` and `..` are paths, and mean the session alone."""

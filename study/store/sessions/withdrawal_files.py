@@ -13,7 +13,7 @@ from typing import Any
 from study.errors import StudyError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.real_folder import is_real_file, is_real_folder, open_folder
-from study.store.sessions.archive import FOLDER_PATTERN, SessionFolder, holds_session, locate_withdrawal_record
+from study.store.sessions.archive import SessionFolder, holds_session, is_session_name, locate_withdrawal_record
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 
 TOMBSTONE_FORMAT, TOMBSTONE_VERSION = "hapteq-tombstone", 1
@@ -66,7 +66,7 @@ def read_intent(data_folder: Path, subject: str) -> WithdrawalIntent | None:
         sessions = {
             str(name): _parse_participant(participant_document)
             for name, participant_document in document["sessions"].items()
-            if _is_session_of_subject(name, subject)
+            if is_session_name(name, subject)
         }
         derived = tuple(str(name) for name in document["derived"] if _is_erasable_path(data_folder, str(name)))
         return WithdrawalIntent(subject, str(document["withdrawn_utc"]), sessions, derived)
@@ -139,12 +139,6 @@ def _has_valid_types(values: Mapping[str, Any]) -> bool:
     return (
         isinstance(values["protocol"], str) and isinstance(values["simulated"], bool) and (number is None or is_number)
     )
-
-
-def _is_session_of_subject(name: Any, subject: str) -> bool:
-    """Whether the name is that of a session folder of this participant."""
-    match = FOLDER_PATTERN.fullmatch(str(name))
-    return match is not None and match["subject"] == subject
 
 
 def _is_erasable_path(data_folder: Path, name: str) -> bool:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from typing import Any, ClassVar
 
 from textual.app import App, SystemCommand
@@ -20,7 +19,6 @@ from textual.screen import Screen
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.errors import ExitCode
-from study.session.views.participant_views import Reply as TrialReply
 from study.session.watching.requests import NoteAsked, PauseAsked
 from study.tui import home_messages
 from study.tui.app import outcomes
@@ -45,9 +43,6 @@ from study.tui.keys.key_names import format_key_name
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.themes import NEXT_THEME, register_themes
 from study.tui.watch.watch_controller import WatchController
-
-DIALOG_POLL_INTERVAL_S = 0.1
-"""Interval (s) at which screens that wait for the end of a dialog are shown. Chosen: not felt as a delay."""
 
 
 class HapteqApp(App[None]):
@@ -98,12 +93,11 @@ class HapteqApp(App[None]):
             await self._begin_sitting(self._start_options.first_sitting)
         else:
             await self._archive.show_home()
-        # By `call_later`, in turn with the engine's messages: the timer itself runs in another task.
-        self.set_interval(DIALOG_POLL_INTERVAL_S, partial(self.call_later, self._release_held_messages))
+        self.screen_change_signal.subscribe(self, self._release_held_messages)
         self.call_after_refresh(self._start_engine)
 
-    async def _release_held_messages(self) -> None:
-        """Let the sitting show what waits for the end of a dialog."""
+    async def _release_held_messages(self, _: Screen[Any]) -> None:
+        """Let the sitting show what waits for the end of a dialog; called in turn with the engine's messages."""
         if self._sitting is not None:
             await self._sitting.release_held_messages()
 
@@ -262,9 +256,8 @@ class HapteqApp(App[None]):
         return generate_commands(self, screen)
 
     def on_trial_screen_replied(self, event: Any) -> None:
-        reply: TrialReply = event.reply
         if self._sitting is not None:
-            self._sitting.send_trial_reply(reply)
+            self._sitting.send_reply(event.reply)
 
     async def on_begin_requested(self, event: home_messages.BeginRequested) -> None:
         if self._sitting is not None:  # a second key press must not begin a second sitting

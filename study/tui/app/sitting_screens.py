@@ -18,7 +18,6 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.participant_views import Reply as TrialReply
 from study.tui.engine.from_engine import (
     CloseRequest,
     DisplayCall,
@@ -142,7 +141,7 @@ class SittingScreens:
             self._held_messages.append(message)
 
     async def release_held_messages(self) -> None:
-        """Handle the messages that were held back, once no dialog is open. Called at intervals, never during
+        """Handle the messages that were held back, once no dialog is open. Called when the screen changes, never during
         `handle_message`."""
         while self._held_messages and not self._is_dialog_open:
             await self._perform(self._held_messages.pop(0))
@@ -174,11 +173,6 @@ class SittingScreens:
                     self._preparing_screen.set_language(words)
             case PreparationStarted(sentence=sentence):
                 await self.show_preparing(sentence)
-
-    def send_trial_reply(self, reply: TrialReply) -> None:
-        """Send the answer to a trial. Called on a message of the trial's screen, which then accepts no further
-        answer."""
-        self._send_reply(reply)
 
     async def show_preparing(self, sentence: str = "") -> None:
         """Show that a slow step is under way (device, report), while no request is open. sentence: current step, empty
@@ -233,9 +227,9 @@ class SittingScreens:
         """Send the result of a dismissed screen as the reply, if its request (`number`) is still open."""
         if number == self._pending_number:
             self._request_screen = None
-            self._send_reply(result)
+            self.send_reply(result)
 
-    def _send_reply(self, reply_value: Any) -> None:
+    def send_reply(self, reply_value: Any) -> None:
         """Send the reply to the open request, if there is one, and close the request."""
         if self._pending_number:
             self._send(Reply(self._pending_number, reply_value))

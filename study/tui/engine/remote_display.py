@@ -99,15 +99,9 @@ class RemoteDisplay:
         end_s = self._clock.now_s() + notice.seconds
         while (remaining_s := end_s - self._clock.now_s()) > 0:
             reply = self._await_reply(request_number, min(KEEPALIVE_INTERVAL_S, remaining_s))
-            if not sign_of_life():
-                return self._close_request(request_number, ENDED_EARLY)
-            if reply is not None:
-                early_end: Unanswered | None = reply.value
+            early_end: Unanswered | None = self._find_end(request_number, reply, sign_of_life)
+            if early_end is not None:
                 return early_end
-            if self._is_screen_silent():
-                return self._close_request(
-                    request_number, make_silent_screen_reply(self._wake_delay_s, self._get_load())
-                )
         self._link.send(CloseRequest(request_number))
         return None
 
@@ -123,15 +117,9 @@ class RemoteDisplay:
             if should_show_wait and not request_number:
                 request_number = self._send_request(DisplayCall.AWAIT_HANDLE, view)
             reply = self._await_reply(request_number)
-            if not sign_of_life():
-                return self._close_request(request_number, ENDED_EARLY)
-            if reply is not None and request_number:
-                early_end: Unanswered | None = reply.value
+            early_end: Unanswered | None = self._find_end(request_number, reply, sign_of_life)
+            if early_end is not None:
                 return early_end
-            if self._is_screen_silent():
-                return self._close_request(
-                    request_number, make_silent_screen_reply(self._wake_delay_s, self._get_load())
-                )
             if self._clock.now_s() - read_s >= HANDLE_POLL_INTERVAL_S:
                 view, read_s = look(), self._clock.now_s()
                 if request_number:
@@ -144,16 +132,9 @@ class RemoteDisplay:
         request_number = self._send_request(DisplayCall.ASK, question)
         deadline_s = self._clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
         while True:
-            reply = self._await_reply(request_number)
-            if not sign_of_life():
-                return self._close_request(request_number, ENDED_EARLY)
-            if reply is not None:
-                answer: Answer = reply.value
+            answer: Answer | None = self._find_end(request_number, self._await_reply(request_number), sign_of_life)
+            if answer is not None:
                 return answer
-            if self._is_screen_silent():
-                return self._close_request(
-                    request_number, make_silent_screen_reply(self._wake_delay_s, self._get_load())
-                )
             if self._clock.now_s() > deadline_s:
                 return self._close_request(request_number, TIMED_OUT)
 
@@ -222,9 +203,18 @@ class RemoteDisplay:
         self._wake_delay_s = max(self._wake_delay_s, self._clock.now_s() - start_s - timeout_s)
         return reply if reply is not None and reply.number == request_number else None
 
-    def _is_screen_silent(self) -> bool:
-        """Whether the screen's last message, usually a heartbeat, is older than `HEARTBEAT_TIMEOUT_S`."""
-        return self._link.compute_silence_s() > HEARTBEAT_TIMEOUT_S
+    def _find_end(self, request_number: int, reply: Reply | None, sign_of_life: SignOfLife) -> Any:
+        """Find how the wait for a request ends: by `sign_of_life`, by the reply, or because the screen's last message,
+        usually a heartbeat, is older than `HEARTBEAT_TIMEOUT_S`; None while it goes on. request_number: 0 where nothing
+        is shown."""
+        if not sign_of_life():
+            return self._close_request(request_number, ENDED_EARLY)
+        if reply is not None and request_number:
+            return reply.value
+        if self._link.compute_silence_s() > HEARTBEAT_TIMEOUT_S:
+            silent_reply = make_silent_screen_reply(self._wake_delay_s, self._get_load())
+            return self._close_request(request_number, silent_reply)
+        return None
 
     def _close_request(self, request_number: int, early_end: Unanswered) -> Unanswered:
         """Close the request on the screen, and return `early_end`. request_number: 0 where nothing is shown."""

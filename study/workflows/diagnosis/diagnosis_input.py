@@ -75,7 +75,8 @@ def read_input(
     _translate_refusal(lambda: require_comparable(recordings, names))
     force_recordings, constant_remarks = _convert_to_forces(recordings, constants)
     prepared_recordings = _translate_refusal(lambda: prepare_recordings(force_recordings, names, for_force_balance))
-    remarks = (*_collect_notes(recordings_with_notes), *constant_remarks, *prepared_recordings.remarks)
+    notes = dict.fromkeys(note for _, notes in recordings_with_notes for note in notes)
+    remarks = (*notes, *constant_remarks, *prepared_recordings.remarks)
     return DiagnosisInput(prepared_recordings.recordings, names, tuple(sources), remarks, constants=constants)
 
 
@@ -105,11 +106,6 @@ def _convert_to_forces(
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
     return tuple(recording for recording, _ in converted_recordings), (converted_recordings[0][1],)
-
-
-def _collect_notes(recordings_with_notes: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
-    """Collect the remarks on the import of all recordings, each only once."""
-    return tuple(dict.fromkeys(note for _, notes in recordings_with_notes for note in notes))
 
 
 def read_given_model(path: Path, diagnosis_input: DiagnosisInput) -> MechanicalModel:

@@ -16,8 +16,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError
 from equalizer.identification.state_space.held_out_validation import HeldOutValidation, validate_on_test
 from equalizer.identification.state_space.identify import IdentificationResult
-from equalizer.identification.state_space.identify_recordings import RecordingsIdentification, identify_recordings
-from equalizer.identification.state_space.misfit import compute_estimate_misfit
+from equalizer.identification.state_space.identify_recordings import identify_recordings
 from equalizer.identification.state_space.misfit_causes import describe_test_error_causes
 from equalizer.identification.state_space.refusals import IdentificationError
 from equalizer.identification.state_space.settings import IdentificationSettings
@@ -104,7 +103,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         identification = identify_recordings(recordings, settings, plan.smooth, on_progress)
         model = _add_provenance(plan, recordings, identification.identified.model, physics)
         held_out_test = validate_on_test(model, recordings)
-        model = replace(model, quality=_assess_quality(identification, recordings, held_out_test))
+        model = replace(model, quality=_assess_quality(identification.identified, recordings, held_out_test))
     except (TransferEstimateError, IdentificationError) as refusal:
         raise _make_error(str(refusal)) from refusal
     except np.linalg.LinAlgError as error:
@@ -129,20 +128,16 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
 
 
 def _assess_quality(
-    identification: RecordingsIdentification, recordings: Sequence[Recording], held_out_test: HeldOutValidation | None
+    identified: IdentificationResult, recordings: Sequence[Recording], held_out_test: HeldOutValidation | None
 ) -> ModelQuality:
-    """Assess the quality of the model: misfit, scatter and held-out error. The misfit is computed against the estimated
-    frequency response, even if the model was fitted to its local averages."""
-    identified, estimate = identification.identified, identification.estimate
-    misfit = compute_estimate_misfit(identified.model, estimate)
+    """Assess the quality of the model: misfit, scatter and held-out error."""
+    misfit = identified.misfit
     remarks = (*identified.remarks, *describe_test_error_causes(held_out_test, identified.cost, misfit, recordings))
     held_out_figures = (
         None if held_out_test is None else (held_out_test.error, held_out_test.noise, held_out_test.seconds)
     )
     remark_sentences = tuple(format_sentence(remark) for remark in remarks)
-    return summarise_quality(
-        misfit.error, identified.scatter, held_out_figures, remark_sentences, identified.misfit.upper_bound
-    )
+    return summarise_quality(misfit.error, identified.scatter, held_out_figures, remark_sentences, misfit.upper_bound)
 
 
 def require_new_output(out_path: Path) -> None:

@@ -110,7 +110,7 @@ def play_contact(
     except ValueError as error:
         raise _make_play_error(f"{plan.transient.name}: {error}.", "Correct what is named.") from error
     feedforward = start.basis.compute_forces(normal)
-    reference = _extend_along_normal(recording, normal, len(feedforward))
+    reference = np.outer(np.pad(recording, (0, len(feedforward) - len(recording))), normal)
     forces = (
         _require_cap(_fade_out(_subtract_spring_force(feedforward, reference, models), rate_hz), plan, rate_hz),
         _require_cap(_compute_gain_forces(model, reference), plan, rate_hz),
@@ -147,10 +147,6 @@ def _read_transient(plan: ContactPlan) -> Trajectory:
             saved="Nothing moved.",
         )
     return table
-
-
-def _extend_along_normal(recording: FloatArray, normal: FloatArray, row_count: int) -> FloatArray:  # (row_count, 3)
-    return np.outer(np.pad(recording, (0, row_count - len(recording))), normal)
 
 
 def _subtract_spring_force(forces: FloatArray, reference: FloatArray, models: PlaybackModels) -> FloatArray:

@@ -20,7 +20,7 @@ from typing import Any
 from study.regular_file import open_regular, read_regular
 from study.store.disk.real_folder import is_real_file, is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
-from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder, holds_session
+from study.store.sessions.archive import TOMBSTONE_NAME, SessionFolder, holds_session, is_session_name
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE_NAME
@@ -54,8 +54,7 @@ def find_traces(data: Path, subject: str, proved_names: Collection[str] = ()) ->
     folders that were proved before an interrupted withdrawal erased their logs."""
     sessions, derived, doubtful = [], [], []
     for path in sorted(data.iterdir()):
-        name_match = FOLDER_PATTERN.fullmatch(path.name)
-        if name_match is not None and name_match["subject"] == subject:
+        if is_session_name(path.name, subject):
             # A folder that was proved earlier counts only without new content, for which nothing is proved.
             if is_session_of(path, subject) or (path.name in proved_names and _is_emptied_session(path)):
                 sessions.append(path.name)
@@ -154,8 +153,7 @@ def _describe_other_folder(path: Path, subject: str) -> Iterator[str]:
 def _may_hold_analysis(path: Path, subject: str) -> bool:
     """Whether the path is a real folder that is neither that of a session, nor named like one of the subject, nor
     unfinished."""
-    name_match = FOLDER_PATTERN.fullmatch(path.name)
-    is_session = holds_session(path) or (name_match is not None and name_match["subject"] == subject)
+    is_session = holds_session(path) or is_session_name(path.name, subject)
     return is_real_folder(path) and not is_session and UNFINISHED_PATTERN.fullmatch(path.name) is None
 
 

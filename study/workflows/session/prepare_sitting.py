@@ -33,8 +33,8 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
             case CheckDevice():
                 state = _check_device_and_computer(state, sitting)
         state = write_notes(state, sitting)
-        if sitting.supervisor.stop_requester is not None:
-            return state, f"the {sitting.supervisor.stop_requester} stopped the session"
+        if stop_reason := sitting.supervisor.stop_reason:
+            return state, stop_reason
     return state, ""
 
 

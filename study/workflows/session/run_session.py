@@ -83,9 +83,9 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
     sitting.display.listen_with(sitting.supervisor.listen_for_stop)
     try:
         return _prepare_and_run_actions(state, sitting)
-    except SittingStoppedError as stop:
+    except SittingStoppedError:
         logged_state = fold_session(sitting.folder).state
-        return _log_sitting_end(ActionResult(logged_state, end_reason=stop.reason), sitting)
+        return _log_sitting_end(ActionResult(logged_state, end_reason=sitting.supervisor.stop_reason), sitting)
 
 
 def _prepare_and_run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
@@ -129,8 +129,7 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
             outcome = replace(outcome, state=state, end_reason=pause_outcome.end_reason)
             if pause_outcome.withdrawn:
                 return _end_withdrawn_sitting(outcome, sitting)
-        if requester := sitting.supervisor.stop_requester:
-            outcome = replace(outcome, end_reason=outcome.end_reason or f"the {requester} stopped the session")
+        outcome = replace(outcome, end_reason=outcome.end_reason or sitting.supervisor.stop_reason)
         if outcome.end_reason:
             return _log_sitting_end(outcome, sitting)
         state = outcome.state

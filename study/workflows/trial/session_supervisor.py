@@ -19,12 +19,7 @@ PLAYING_ACTIVITIES = ("trial", "demo", "probe", "reference")
 
 
 class SittingStoppedError(Exception):
-    """A stop was requested while a form or a notice waited for the participant; the device is stopped already. reason:
-    why the sitting ends, a clause."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
+    """A stop was requested while a form or a notice waited for the participant; the device is stopped already."""
 
 
 class SessionSupervisor:
@@ -97,18 +92,23 @@ class SessionSupervisor:
                 case NoteAsked():
                     self._notes.append(request)
 
+    @property
+    def stop_reason(self) -> str:
+        """Why a requested stop ends the sitting, a clause; empty without a request."""
+        return f"the {self.stop_requester} stopped the session" if self.stop_requester else ""
+
     def listen_for_stop(self) -> None:
         """Take pending requests while a form or a notice is open, in which nothing plays. Raises SittingStoppedError
         once a stop is requested; a pause begins after the form."""
         self.listen()
         if self.stop_requester is not None:
-            raise SittingStoppedError(f"the {self.stop_requester} stopped the session")
+            raise SittingStoppedError
 
     def resolve(self, reply: Reply) -> Reply:
         """Choose the reply to a wait, by priority: a stop request, the answer on the display, the answer by a button, a
         pause request, the other reply of the display."""
         if self.stop_requester is not None:
-            return Unanswered(f"the {self.stop_requester} stopped the session", ends_sitting=True)
+            return Unanswered(self.stop_reason, ends_sitting=True)
         if isinstance(reply, Answered):
             return reply
         if self._answer is not None:

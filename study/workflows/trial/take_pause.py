@@ -40,6 +40,7 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutco
         return supervisor.keep_alive()
 
     decision = sitting.display.pause(PauseNotice(reason, state.answers), sign_of_life)
+    is_withdrawal = decision is AfterPause.WITHDRAW
     # Cleared after the pause, so that a request made during the pause does not start another one.
     supervisor.pause_requester = None
     paused_s = sitting.clock.now_s() - started_s
@@ -48,9 +49,8 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutco
         state = log_and_apply(write_notes(state, sitting), pause_taken, sitting)
     except StudyError:
         # A full disk must not hide a withdrawal, which erases the log.
-        if decision is not AfterPause.WITHDRAW:
+        if not is_withdrawal:
             raise
     # A stop that is requested at the same time must not hide a withdrawal, which erases the data.
-    if supervisor.stop_requester is not None and decision is not AfterPause.WITHDRAW:
-        return PauseOutcome(state, f"the {supervisor.stop_requester} stopped the session", withdrawn=False)
-    return PauseOutcome(state, END_REASONS.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)
+    stop_reason = "" if is_withdrawal else supervisor.stop_reason
+    return PauseOutcome(state, stop_reason or END_REASONS.get(decision, ""), is_withdrawal)

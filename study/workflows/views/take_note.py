@@ -4,6 +4,8 @@ A log has a single writer. While a session runs, its program is that writer, and
 otherwise the note is appended directly, with the session's lock held.
 """
 
+from itertools import chain
+
 from study.devices.clock import Clock
 from study.errors import StudyError
 from study.session.facts.events import NoteTaken
@@ -64,7 +66,8 @@ def _append_notes(folder: SessionFolder, notes: tuple[NoteAsked, ...], clock: Cl
                 log.append(_make_program_note(f"a torn last line was cut off: {log_contents.torn}", clock))
             inbox = RequestInbox(folder.path)
             inbox.clear()
-            waiting_notes = [request for request in inbox.take() if isinstance(request, NoteAsked)]
+            waiting_requests = chain.from_iterable(iter(inbox.take, ()))  # a call takes a limited number
+            waiting_notes = [request for request in waiting_requests if isinstance(request, NoteAsked)]
             for note in (*waiting_notes, *notes):
                 log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
                 inbox.forget_logged(note)

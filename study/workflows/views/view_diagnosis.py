@@ -12,6 +12,7 @@ from analysis.diagnosis.result.wording import (
     describe_rivals,
     describe_verdict,
 )
+from analysis.diagnosis.unit_wording import format_probability
 from analysis.wording import MISSING, conjoin, format_p
 from study.errors import StudyError
 from study.session.views.archive_views import DiagnosisView
@@ -64,7 +65,7 @@ def _describe_named_effect(effect: NamedEffect, device: DeviceWording | None) ->
     """Describe in sentences a named effect, and the effects that the recording cannot distinguish from it."""
     effect_text = (
         f"{describe_effect(effect, device=device)} It explains {_format_percent(effect.share)} of the mismatch that "
-        f"remains after re-tuning (probability {_format_probability(effect.probability)})."
+        f"remains after re-tuning (probability {format_probability(effect.probability)})."
     )
     return tuple(filter(None, (effect_text, describe_equivalents(effect))))
 
@@ -115,8 +116,3 @@ def _list_notes(diagnosis: Diagnosis) -> tuple[str, ...]:
 def _format_percent(share: float) -> str:
     """Format a share (1 = 100 %) in whole percent."""
     return f"{100 * share:.0f} %"
-
-
-def _format_probability(probability: float) -> str:
-    """Format a probability with two decimals; above 0.99 as "> 0.99"."""
-    return "> 0.99" if probability > 0.99 else f"{probability:.2f}"

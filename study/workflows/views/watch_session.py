@@ -1,7 +1,6 @@
-"""Follow a running session from a second process, and send requests to it (stop, pause, note).
+"""Follow a running session from a second process.
 
-The log is only read: new lines are checked against the hash chain and applied to the state one by one. A request is a
-file in the session's inbox.
+The log is only read: new lines are checked against the hash chain and applied to the state one by one.
 """
 
 import io
@@ -18,14 +17,12 @@ from study.session.views.printable import make_printable
 from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
 from study.session.watching.live_state import LiveState
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
-from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import LIVE_TIMEOUT_S
 from study.session.watching.watch_view import DriftRecord, WatchView
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
 from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.log_seal import find_seals, read_seal
-from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import load_logged_protocol
 
 if TYPE_CHECKING:
@@ -38,12 +35,6 @@ LOCK_CHECK_INTERVAL_S = 1.0
 def follow(folder: Path) -> "Follower":
     """Make a follower of the session in this folder; nothing is read yet."""
     return Follower(SessionFolder(folder))
-
-
-def send_session_request(folder: Path, request: Request) -> str:
-    """Send a request to the session in this folder; returns its name in the session's inbox. Raises StudyError where it
-    cannot be written."""
-    return RequestInbox(folder).send(request)
 
 
 class Follower:
