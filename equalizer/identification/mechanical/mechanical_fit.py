@@ -209,11 +209,11 @@ def _fit_rigid_starts(
     stage_groups = [
         part for group in groups if len((part := group.select_lines(group.frequency_hz <= stage_end_hz)).frequency_hz)
     ]
-    for band_share in _BAND_SHARES:
-        end_hz = band_hz[0] * (stage_end_hz / band_hz[0]) ** band_share
+    part_ends_hz = [band_hz[0] * (stage_end_hz / band_hz[0]) ** share for share in _BAND_SHARES]
+    for end_hz in (*part_ends_hz, band_hz[1]):
         low_segments = select_band(segments, (band_hz[0], end_hz))
         line_count = sum(len(segment.frequency_hz) for segment in low_segments)
-        if line_count < _MIN_LINES * structure.inputs and (fits or band_share != _BAND_SHARES[-1]):
+        if line_count < _MIN_LINES * structure.inputs and (fits or end_hz < part_ends_hz[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
             rigid_starts = estimate_rigid_starts(low_segments, replace(structure, delayed=delayed), settings.floor)
