@@ -18,7 +18,7 @@ from analysis.diagnosis.balance.motion import (
     NoMotionError,
     compute_motion_band_hz,
     compute_motions,
-    find_motion_signal,
+    find_motion_signals,
 )
 from analysis.diagnosis.data.measured_motion import stays_at_limit
 from analysis.diagnosis.data.observed import Observed
@@ -69,7 +69,7 @@ def _find_clipped_accelerations(recordings: Sequence[Recording], motions: Sequen
     may rest at a stop, or keep its speed, but under changing forces it does not keep its largest acceleration."""
     if motions[0].order < 2:
         return []
-    samples = np.vstack([signal.samples for recording in recordings if (signal := find_motion_signal(recording))])
+    samples = np.vstack([signal.samples for signal in find_motion_signals(recordings)])
     return [name for name, readings in zip(motions[0].channels, samples.T, strict=True) if stays_at_limit(readings)]
 
 

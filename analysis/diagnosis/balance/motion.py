@@ -95,23 +95,25 @@ class Motion:
         return (mask & interior)[:: self.step]
 
 
-def find_motion_signal(recording: Recording) -> Signal | None:
-    """Find the channels to compute the motion from: in the position and in the response, the varying ones of the lowest
-    measured order of the position's time derivative (0, 1 or 2); of the two, those of the lower order, or the
-    position's. None without any."""
-    signals: list[tuple[int, Signal]] = []
-    for signal in (recording.position, recording.response):
-        if signal is None:
+def find_motion_signals(recordings: Sequence[Recording]) -> tuple[Signal, ...]:
+    """Find the channels to compute the motion from, the same for all recordings: in the positions and in the responses,
+    those of the lowest measured order of the position's time derivative (0, 1 or 2) that vary in any recording; of the
+    two, those of the lower order, or the positions'. Empty without any."""
+    candidates: list[tuple[int, tuple[Signal, ...]]] = []
+    for signals in ([each.position for each in recordings], [each.response for each in recordings]):
+        present_signals = [signal for signal in signals if signal is not None]
+        if not present_signals or len(present_signals) < len(signals):
             continue
-        orders = [DERIVATIVE_OF_QUANTITY.get(quantity) for quantity in signal.quantities]
-        measured_orders = [order for order in orders if order is not None]
-        if not measured_orders:
-            continue
-        lowest_order = min(measured_orders)
-        columns = [k for k, order in enumerate(orders) if order == lowest_order and _is_varying(signal.samples[:, k])]
+        orders = [DERIVATIVE_OF_QUANTITY.get(quantity) for quantity in present_signals[0].quantities]
+        lowest_order = min((order for order in orders if order is not None), default=-1)
+        columns = [
+            column
+            for column, order in enumerate(orders)
+            if order == lowest_order and any(_is_varying(signal.samples[:, column]) for signal in present_signals)
+        ]
         if columns:
-            signals.append((lowest_order, signal.select_channels(columns)))
-    return min(signals, key=lambda item: item[0])[1] if signals else None
+            candidates.append((lowest_order, tuple(signal.select_channels(columns) for signal in present_signals)))
+    return min(candidates, key=lambda item: item[0])[1] if candidates else ()
 
 
 def _is_varying(samples: FloatArray) -> bool:
@@ -125,10 +127,9 @@ def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -
     zero-order hold, a motion that was not imposed is advanced by half a sample; the acceleration of a free motion is
     set to zero. records: with the same channels, units and rate. band_hz: upper end of the band (Hz); None = the
     highest that the noise allows. Raises NoMotionError where there are no records, or a record contains no motion."""
-    signals = [find_motion_signal(record.recording) for record in records]
-    if not signals or any(signal is None for signal in signals):
+    motion_signals = find_motion_signals([record.recording for record in records])
+    if not motion_signals or not all(any(map(_is_varying, signal.samples.T)) for signal in motion_signals):
         raise NoMotionError("no response is a position, velocity or acceleration")
-    motion_signals = [signal for signal in signals if signal is not None]
     order = DERIVATIVE_OF_QUANTITY[motion_signals[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz
     filled_samples = [fill_gaps(signal.samples) for signal in motion_signals]

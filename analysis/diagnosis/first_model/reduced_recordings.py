@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.motion import Motion, find_motion_signal
+from analysis.diagnosis.balance.motion import Motion, find_motion_signals
 from analysis.diagnosis.data.observed_parts import find_parts
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -36,18 +36,22 @@ def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balanc
     accelerations (with a band-limited hold); position and excitation are removed. recordings: those of the balances, in
     the same order."""
     reduced_recordings, first_part = [], 0
-    for recording in recordings:
+    for recording, measured_motion in zip(recordings, find_motion_signals(recordings), strict=True):
         parts = find_parts(recording)
-        reduced_recordings.append(_reduce_recording(recording, parts, balances, first_part))
+        reduced_recordings.append(_reduce_recording(recording, measured_motion, parts, balances, first_part))
         first_part += len(parts)
     return tuple(reduced_recordings)
 
 
 def _reduce_recording(
-    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
+    recording: Recording,
+    measured_motion: Signal,
+    parts: Sequence[tuple[int, int]],
+    balances: Sequence[Balance],
+    first_part: int,
 ) -> Recording:
-    """Reduce one recording. parts: start and stop of each, in samples. first_part: index of its first part among all
-    motions."""
+    """Reduce one recording. measured_motion: its channels from which motions were computed. parts: start and stop of
+    each, in samples. first_part: index of its first part among all motions."""
     command_samples = recording.command.samples.copy()
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
@@ -58,7 +62,7 @@ def _reduce_recording(
             command_samples[start:stop, axis] = (
                 motion.filter_to_band(remaining_force[:, None])[:, 0] if motion.order == 2 else remaining_force
             )
-    response, is_integrated = _extract_driven_motions(recording, parts, balances, first_part)
+    response, is_integrated = _extract_driven_motions(recording.command, measured_motion, parts, balances, first_part)
     return replace(
         recording,
         command=replace(recording.command, samples=command_samples),
@@ -96,13 +100,15 @@ def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
 
 
 def _extract_driven_motions(
-    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
+    command: Signal,
+    measured_motion: Signal,
+    parts: Sequence[tuple[int, int]],
+    balances: Sequence[Balance],
+    first_part: int,
 ) -> tuple[Signal, bool]:
     """Return the driven motions as a signal, one channel per command or fewer, and whether they are positions that were
     integrated from accelerations."""
     regression = balances[0].search.regression
-    measured_motion = find_motion_signal(recording)
-    assert measured_motion is not None
     motion_count = len(regression.motions[0].channels)
     driven_channels = [
         axis if motion_count <= len(balances) else balances[axis].search.regression.base_terms.driven_channel
@@ -113,7 +119,7 @@ def _extract_driven_motions(
     if order == 2:  # measured accelerations
         for part_index, (start, stop) in enumerate(parts, first_part):
             samples[start:stop] = regression.motions[part_index].position
-        units = tuple(determine_unit_system(recording.command.units, (unit,)).length for unit in units)
+        units = tuple(determine_unit_system(command.units, (unit,)).length for unit in units)
         quantities = tuple("angle" if unit == "rad" else "position" for unit in units)
     return replace(measured_motion, samples=samples, quantity=quantities, unit=units).select_channels(
         driven_channels

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.laws.motion_laws import make_laws
-from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signal
+from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signals
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.limits import HIGHEST_BAND_END_RATIO
 from equalizer.signals.recording import Hold
@@ -124,8 +124,8 @@ def test_without_a_clock_no_law_asks_how_fast_it_moves(record_samples):
 def test_a_motion_is_of_the_lowest_derivative_and_moves(record_samples):
     both = record_samples(exact_derivative(2), exact_derivative(2), RATE_HZ, "acceleration")
     position = Signal(np.hstack([exact_derivative(0), np.ones((COUNT, 1))]), RATE_HZ, "position", "m", ("x", "y"))
-    assert find_motion_signal(replace(both, position=position)).channels == ("x",)
-    assert find_motion_signal(both).quantities == ("acceleration",)
+    assert find_motion_signals([replace(both, position=position)])[0].channels == ("x",)
+    assert find_motion_signals([both])[0].quantities == ("acceleration",)
     still = record_samples(exact_derivative(2), np.ones((COUNT, 1)), RATE_HZ)
     with pytest.raises(NoMotionError, match="no response is a position, velocity or acceleration"):
         observe_motion(still)
@@ -139,3 +139,12 @@ def test_conditions_count_in_their_own_spread_and_constant_ones_not(record_sampl
     ).condition
     assert found.shape == (COUNT, 1)
     assert (found.mean(), found.std()) == (pytest.approx(0.0, abs=1e-9), pytest.approx(1.0))
+
+
+def test_an_axis_that_rests_in_one_of_several_recordings_is_a_motion_of_all(record_samples):
+    both = np.hstack([exact_derivative(0), exact_derivative(1)])
+    first = record_samples(exact_derivative(2), both, RATE_HZ)
+    second = record_samples(exact_derivative(2), both * [1.0, 0.0], RATE_HZ)
+    for recordings in ((first, second), (second, first)):
+        assert [signal.samples.shape for signal in find_motion_signals(recordings)] == [both.shape] * 2
+    assert find_motion_signals([second, second])[0].samples.shape == (len(both), 1)
