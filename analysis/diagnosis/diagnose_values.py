@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import get_args
 
-from analysis.diagnosis.balance.laws.free_laws import list_excluded_laws
+from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS, list_excluded_laws
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_comparable, require_model_of
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.effect_words import LAW_WORDS
 from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.fit_without_model import fit_first_linear_model, fit_first_model
@@ -69,11 +70,11 @@ def diagnose_values(
 
 def _require_valid_settings(settings: DiagnosisSettings, recording_count: int) -> None:
     """Raise NothingToDiagnoseError for names that are not one per recording, effects to leave out that neither the
-    catalogue nor the kept laws contain, and an unknown comparison."""
+    catalogue nor the laws of the force balance nor the kept laws contain, and an unknown comparison."""
     problems = []
     if settings.names and len(settings.names) != recording_count:
         problems.append(f"names has {len(settings.names)} entries for {recording_count} recordings; give one for each")
-    known_effects = {*EFFECTS_BY_NAME, *(entry.name for entry in settings.kept)}
+    known_effects = {*EFFECTS_BY_NAME, *LAW_WORDS, *FREE_LAWS, *(entry.name for entry in settings.kept)}
     if unknown_effects := [name for name in settings.without if name not in known_effects]:
         problems.append(f"there is no effect {', '.join(unknown_effects)} to leave out; see equalizer.EFFECTS")
     if settings.compared not in get_args(Compared):

@@ -14,7 +14,7 @@ from analysis.psychophysics.declared_result import NOT_CONVERGED_NOTE
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.likelihood_thresholds import LikelihoodThreshold, convert_to_newton
-from analysis.psychophysics.hierarchy.objective import LOG_SD_BOUNDS
+from analysis.psychophysics.hierarchy.objective import LOG_SD_BOUNDS, LOG_SLOPE_BOUNDS
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import describe_measured_coverage
@@ -23,7 +23,7 @@ from analysis.threshold_words import select_threshold_words
 from analysis.wording import MISSING, conjoin, format_newtons, format_number, format_p, format_p_text, format_signed
 
 BOUND_TOLERANCE_LOG = 0.01
-"""Distance of ln(standard deviation) from its upper bound, below which the fit counts as ended at the bound. Chosen."""
+"""Distance of the log of a standard deviation or slope from its bound, below which it counts as there. Chosen."""
 INTRODUCTION = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
     "frequency; slopes and response biases differ by person. An answer at the cap is an answer like any other, "
@@ -131,8 +131,8 @@ def describe_far_above(primary: PrimaryAnalysis) -> str:
 
 
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
-    """Describe that the fit did not converge, and the standard deviations between persons whose search ended at its
-    upper bound: sentences with a leading space; empty without either."""
+    """Describe that the fit did not converge, and that the search ended at a bound of the median slope, or at the upper
+    one of standard deviations between persons: sentences with a leading space; empty without either."""
     convergence_text = "" if primary.converged else f" {NOT_CONVERGED_NOTE}"
     sds = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
     quantity_names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
@@ -141,12 +141,14 @@ def describe_undetermined(primary: PrimaryAnalysis) -> str:
         for name, sd, (_, upper_bound) in zip(quantity_names, sds, LOG_SD_BOUNDS, strict=True)
         if math.log(sd) > upper_bound - BOUND_TOLERANCE_LOG
     ]
-    if not undetermined:
-        return convergence_text
-    return (
-        f"{convergence_text} The answers do not determine how much people differ in their {conjoin(undetermined)}: the "
-        "search ended at its bound. Do not use the median slope, nor single curves."
+    slope_margin_log = min(abs(math.log(primary.slope) - bound) for bound in LOG_SLOPE_BOUNDS)
+    subjects = ["the median slope"] if slope_margin_log < BOUND_TOLERANCE_LOG else []
+    subjects += [f"how much people differ in their {conjoin(undetermined)}"] if undetermined else []
+    bound_text = (
+        f" The answers do not determine {conjoin(subjects)}: the search ended at its bound. Do not use the median "
+        "slope, nor single curves."
     )
+    return convergence_text + (bound_text if subjects else "")
 
 
 def describe_direction_limit(primary: PrimaryAnalysis) -> str:

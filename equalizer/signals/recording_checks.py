@@ -41,12 +41,19 @@ def _find_foreign_units(recording: Recording) -> Iterator[str]:
     for name, signal in collect_signals(recording).items():
         for channel, unit in zip(signal.channels, signal.units, strict=True):
             try:
-                si = parse_unit(unit).si
+                parsed_unit = parse_unit(unit)
             except UnknownUnitError as error:
                 yield f"{name} {channel}: {error}"
+                continue
+            if parsed_unit.si == unit:
+                continue
+            if (parsed_unit.factor, parsed_unit.offset) == (1.0, 0.0):
+                yield f"{name} {channel} is in {unit}; state that unit as {parsed_unit.si}"
             else:
-                if si != unit:
-                    yield f"{name} {channel} is in {unit}; convert its samples to SI, here {si}, and state that unit"
+                yield (
+                    f"{name} {channel} is in {unit}; convert its samples to SI, here {parsed_unit.si}, and state that "
+                    "unit"
+                )
 
 
 def collect_signals(recording: Recording) -> dict[str, Signal]:
@@ -121,7 +128,7 @@ def find_length_problems(recording: Recording) -> Iterator[str]:
         if len(signal) != len(recording):
             yield f"{name} has {len(signal)} samples, but response has {len(recording)}; all must be equally long"
         if signal.sample_rate_hz != recording.sample_rate_hz:
-            yield f"{name} is at {signal.sample_rate_hz:g} Hz, but response at {recording.sample_rate_hz:g} Hz"
+            yield f"{name} is at {signal.sample_rate_hz:.12g} Hz, but response at {recording.sample_rate_hz:.12g} Hz"
 
 
 def _check_signals(recording: Recording) -> Iterator[str]:

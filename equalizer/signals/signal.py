@@ -107,16 +107,17 @@ def _copy_unless_immutable(samples: Any) -> FloatArray:
     return copy
 
 
-def _fold_equal_words(field_name: str, words: str | tuple[str, ...], channel_count: int) -> str | tuple[str, ...]:
+def _fold_equal_words(field_name: str, words: str | Sequence[str] | None, channel_count: int) -> str | tuple[str, ...]:
     """Reduce equal words to a single one. Raises ValueError for another number of words than channels, or None."""
     if isinstance(words, str):
         return words
-    word_count = len(words or ())
-    if word_count != channel_count:
+    listed_words = () if words is None else tuple(words)
+    if len(listed_words) != channel_count:
         raise ValueError(
-            f"{word_count} entries of {field_name} for {channel_count} channels; give one for all, or one per channel"
+            f"{len(listed_words)} entries of {field_name} for {channel_count} channels; give one for all, or one per "
+            "channel"
         )
-    return words[0] if len(set(words)) == 1 else tuple(words)
+    return listed_words[0] if len(set(listed_words)) == 1 else listed_words
 
 
 def find_runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -4,6 +4,7 @@
 `print_file_text` prints the content of a file.
 """
 
+import io
 import os
 import shutil
 import sys
@@ -45,9 +46,9 @@ def read_terminal_width() -> int | None:
 
 def print_file_text(text: str) -> None:
     """Print the content of a text file on stdout: in UTF-8 where that is a file or pipe, whose own encoding could not
-    hold each character, and hapteq reads UTF-8."""
-    is_terminal = sys.stdout is not None and sys.stdout.isatty()
-    typer.echo(text if is_terminal else text.encode(), nl=False)
+    hold each character, and hapteq reads UTF-8. What cannot be encoded, such as bytes of a file name, becomes "?"."""
+    is_file = isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty()
+    typer.echo(text.encode(errors="replace") if is_file else text, nl=False)
 
 
 def open_screen(options: "StartOptions", as_json: bool) -> None:

@@ -116,6 +116,17 @@ def test_arrays_in_units_outside_si_are_a_problem_of_the_named_recording(recordi
     assert unknown.startswith("c: command x: 'furlong' is not a unit known here")
 
 
+@pytest.mark.parametrize(("unit", "si"), [("counts", "1"), ("Nm", "N m")])
+def test_a_unit_of_the_same_scale_needs_no_conversion(recording, unit, si):
+    said, _ = list_recording_problems([replace(recording, command=replace(recording.command, unit=unit))])
+    assert said.endswith(f"is in {unit}; state that unit as {si}")
+
+
+def test_rates_that_differ_in_the_last_digits_are_stated_by_all_digits(recording):
+    problem = the_problem(replace(recording, command=signal(rate_hz=1000.0 + 1e-6)))
+    assert problem == "command is at 1000.000001 Hz, but response at 1000 Hz"
+
+
 def test_indices_of_a_segment_are_whole_numbers(recording):
     half = replace(recording, segments=(Segment(0, 50, "sine", period=12.5),))
     assert the_problem(half) == "segment 1 has the start, stop or period 0, 50, 12.5; give whole numbers"

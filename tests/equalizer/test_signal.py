@@ -62,6 +62,11 @@ def test_a_unit_that_is_not_stated_is_refused_by_name():
         signal(unit=None)
 
 
+@pytest.mark.parametrize("unit", [["N", "N m"], np.array(["N", "N m"]), pd.Index(["N", "N m"])])
+def test_units_may_be_any_sequence(unit):
+    assert signal(unit=unit).units == ("N", "N m")
+
+
 def test_a_masked_sample_is_missing():
     masked = np.ma.array([[1], [2], [3]], mask=[[0], [1], [0]])
     assert np.isnan(Signal(masked, 1000.0, "force", "N", ("fx",)).samples).tolist() == [[False], [True], [False]]

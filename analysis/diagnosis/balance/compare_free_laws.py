@@ -34,7 +34,7 @@ from analysis.diagnosis.limits import FREE_LAW_GAIN, MOST_SUMMED_LAWS, PLAINER_S
 
 MOST_COMPARED_SUMS = 12
 """Number of sums whose nonlinear parameters are refined. Chosen: there are eleven free laws."""
-SURPASSED_REASON = "a single law that the catalogue lacks explains more than the sum of laws to which it belongs"
+SURPASSED_REASON = "a single law that the catalogue lacks explains more than the sum of laws of which this is one"
 """Reason, in a message, not to name the laws of a sum."""
 CONTACTS = {"end_stop", "contact_beyond_position"}
 """Laws of a contact that closes at a position, in the catalogue and outside."""

@@ -77,14 +77,14 @@ def assign_channels(motions: Sequence[Motion]) -> tuple[int, ...]:
     """Assign to each force the channel whose acceleration its regression needs most (linear assignment). motions: with
     at least as many channels as forces."""
     force_count, channel_count = motions[0].force.shape[1], len(motions[0].channels)
-    errors = [_compute_errors_without_channel(motions, axis, channel_count) for axis in range(force_count)]
+    errors = [compute_errors_without_channel(motions, axis, channel_count) for axis in range(force_count)]
     # Imported here: most diagnoses do not need this slow import.
     from scipy.optimize import linear_sum_assignment
 
     return tuple(linear_sum_assignment(errors, maximize=True)[1].tolist())
 
 
-def _compute_errors_without_channel(motions: Sequence[Motion], axis: int, channel_count: int) -> list[float]:
+def compute_errors_without_channel(motions: Sequence[Motion], axis: int, channel_count: int) -> list[float]:
     """Compute, per channel, the cross-validated squared error without that channel's acceleration, over the power of
     the force about its mean."""
     regression = build_regression(motions, axis, (), turns=False)

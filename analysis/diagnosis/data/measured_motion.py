@@ -21,6 +21,11 @@ FORCE_QUANTITIES = frozenset({"force", "torque"})
 
 READING_TOLERANCE = 1e-9
 """Relative difference up to which readings count as equal to a limit."""
+NEXT_LEVEL_COUNT, NEXT_LEVELS_FACTOR = 4, 2.0
+"""Number of levels below the largest reading, and least ratio of the readings at the largest to those at any of these,
+for a limit (`stays_at_limit`). Chosen: a periodic command repeats its peak, whose few readings one step lower, by
+noise, are a level of their own. Compared with the next level alone, 78 of 800 simulated periodic recordings without a
+fault would count as clipped; with these, 1 of 1700."""
 
 FREE_MOTION = "free"
 """Value of `meta["imposed"]` of a free (undriven) motion."""
@@ -136,21 +141,22 @@ def convert_all_to_force_driven(recordings: Sequence[Recording]) -> tuple[Record
 
 
 def stays_at_limit(readings: FloatArray) -> bool:
-    """Whether significantly more readings (n,) lie at the largest magnitude than at the next smaller one, as with a
-    clipped sensor. A sine that was rounded has up to 2.4 times as many there, which is below `READINGS_FACTOR`."""
-    _, top_count, next_count = count_top_readings(readings[np.isfinite(readings)])
-    return next_count > 0 and is_unusual_count(top_count, next_count)
+    """Whether significantly more readings (n,) lie at the highest, at the lowest, or at the largest magnitude than at
+    the next level, and than at any of the next `NEXT_LEVEL_COUNT`, as with a clipped sensor. The limits of a converter
+    differ by one step, and those of a sensor by its offset. A sine that was rounded has up to 2.4 times as many there,
+    which is below `READINGS_FACTOR`."""
+    known = readings[np.isfinite(readings) & (readings != 0)]
+    return any(_has_limit(side) for side in (known[known > 0], -known[known < 0], np.abs(known)) if len(side))
 
 
-def count_top_readings(readings: FloatArray) -> tuple[float, int, int]:
-    """Return the largest magnitude of the readings (n,), n >= 1, the number of readings there, and the number at the
-    next smaller magnitude; 0 without one."""
-    magnitudes = np.abs(readings)
-    largest_magnitude = float(magnitudes.max())
-    is_at_limit = magnitudes >= largest_magnitude * (1 - READING_TOLERANCE)
-    smaller_magnitudes = magnitudes[~is_at_limit]
-    next_magnitude = smaller_magnitudes.max(initial=0.0) * (1 - READING_TOLERANCE)
-    return largest_magnitude, int(is_at_limit.sum()), int(np.count_nonzero(smaller_magnitudes >= next_magnitude))
+def _has_limit(magnitudes: FloatArray) -> bool:
+    """Whether magnitudes (n,), n >= 1, above 0, stay at the largest. Levels differ by `READING_TOLERANCE` of it."""
+    levels = np.round(magnitudes / magnitudes.max() / READING_TOLERANCE)
+    *lower_counts, top_count = np.unique(levels, return_counts=True)[1].tolist()
+    return bool(lower_counts) and (
+        is_unusual_count(top_count, lower_counts[-1])
+        and top_count > NEXT_LEVELS_FACTOR * max(lower_counts[-NEXT_LEVEL_COUNT:])
+    )
 
 
 def is_unusual_count(count: int, usual_count: float) -> bool:

@@ -247,7 +247,8 @@ def _select_excitation(excitation: Signal | None, command: Signal, kept_channels
 
 
 def _append_channels(condition: Signal | None, command: Signal, indices: Sequence[int]) -> Signal:
-    """Append these channels of the command to the conditions (None = none yet)."""
+    """Append these channels of the command to the conditions (None = none yet), as "command T" where T is a condition
+    already: no signal names a channel twice."""
     new_conditions = command.select_channels(indices)
     if condition is None:
         return new_conditions
@@ -256,5 +257,8 @@ def _append_channels(condition: Signal | None, command: Signal, indices: Sequenc
         new_conditions.sample_rate_hz,
         (*condition.quantities, *new_conditions.quantities),
         (*condition.units, *new_conditions.units),
-        (*condition.channels, *new_conditions.channels),
+        (
+            *condition.channels,
+            *(f"command {name}" if name in condition.channels else name for name in new_conditions.channels),
+        ),
     )

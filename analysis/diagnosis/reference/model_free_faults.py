@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.data.measured_motion import READING_TOLERANCE, count_top_readings, is_unusual_count
+from analysis.diagnosis.data.measured_motion import READING_TOLERANCE, is_unusual_count
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, make_claim_hypothesis
 from analysis.diagnosis.limits import STEP_FACTOR
 from analysis.diagnosis.types import Mask
@@ -122,8 +122,13 @@ def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> Ch
 def _count_top_excess(values: FloatArray) -> tuple[float, int]:
     """Return the largest magnitude of one channel, (n,), and the number of readings there less the number at the next
     smaller magnitude."""
-    limit, top_count, next_count = count_top_readings(values)
-    return limit, top_count - next_count
+    magnitudes = np.abs(values)
+    largest_magnitude = float(magnitudes.max())
+    is_at_limit = magnitudes >= largest_magnitude * (1 - READING_TOLERANCE)
+    smaller_magnitudes = magnitudes[~is_at_limit]
+    next_magnitude = smaller_magnitudes.max(initial=0.0) * (1 - READING_TOLERANCE)
+    next_level_count = int(np.count_nonzero(smaller_magnitudes >= next_magnitude))
+    return largest_magnitude, int(np.count_nonzero(is_at_limit)) - next_level_count
 
 
 def _count_repeats_below_top(values: FloatArray) -> int:

@@ -53,11 +53,10 @@ def main(arguments: list[str]) -> None:
 def isolate_process(open_folder: Path) -> None:
     """Block the import of the challenge, and install an audit hook: from now on this process cannot open the files of
     the challenge, open or list anything of the bank but `open_folder`, or start a program. The import then raises
-    ImportError, the rest PermissionError. The bank is the parent folder of `open_folder`, or for follow-ups and
-    controls, which lie in the folder of another bank, that folder."""
+    ImportError, the rest PermissionError. The bank is the parent folder of `open_folder`, and for follow-ups and
+    controls also the bank in whose folder they lie."""
     sys.modules[CHALLENGE_PACKAGE] = cast(ModuleType, None)
-    bank_folders = [open_folder.parent, *(path for path in open_folder.parents if (path / BANK_FILE).exists())]
-    bank_folder, real_open_folder = os.path.realpath(bank_folders[-1]), os.path.realpath(open_folder)
+    bank_folders, real_open_folder = _find_bank_folders(open_folder), os.path.realpath(open_folder)
     challenge_folder = os.path.realpath(Path(study.__path__[0]).joinpath(*CHALLENGE_PACKAGE.split(".")[1:]))
 
     def is_inside(path: str, folder: str) -> bool:
@@ -71,12 +70,20 @@ def isolate_process(open_folder: Path) -> None:
         if event not in FILE_EVENTS or not arguments or not isinstance(arguments[0], str | bytes | os.PathLike):
             return
         path = os.path.realpath(os.fsdecode(arguments[0]))
-        if (is_inside(path, bank_folder) and not is_inside(path, real_open_folder)) or is_inside(
-            path, challenge_folder
-        ):
+        is_in_bank = any(is_inside(path, bank_folder) for bank_folder in bank_folders)
+        if (is_in_bank and not is_inside(path, real_open_folder)) or is_inside(path, challenge_folder):
             raise PermissionError(f"a diagnosis must not open {path}")
 
     sys.addaudithook(audit)
+
+
+def _find_bank_folders(open_folder: Path) -> set[str]:
+    """Find the real paths of the folders of the bank: the parent folder of `open_folder`, and every folder with the
+    settings of a bank up to three levels above it (controls/SEED/open), as it is written and behind links: in a path
+    as it is written, ".." makes a folder look like a parent that is none."""
+    near_folders = (*open_folder.parents[:3], *Path(os.path.realpath(open_folder)).parents[:3])
+    settings_folders = (path for path in near_folders if (path / BANK_FILE).exists())
+    return {os.path.realpath(path) for path in (open_folder.parent, *settings_folders)}
 
 
 def answer_case(case_folder: Path, engine_hash: str) -> None:

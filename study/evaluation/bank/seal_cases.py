@@ -135,9 +135,12 @@ def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -
 
 
 def write_redrawn_recording(case_folder: Path, case: Case, label: dict[str, Any]) -> None:
-    """Write the recording of a case that was drawn again. Raises StudyError where its hash is not that of the label."""
-    write_recording(case_folder / RECORDING_FILE, case.recording, precision="float32", overwrite=True)
-    if compute_sha256(case_folder / RECORDING_FILE) != label["recording_sha256"]:
+    """Write the recording of a case that was drawn again. Raises StudyError, and removes it, where its hash is not that
+    of the label: the next run would diagnose it, and the answer would break the seal."""
+    path = case_folder / RECORDING_FILE
+    write_recording(path, case.recording, precision="float32", overwrite=True)
+    if compute_sha256(path) != label["recording_sha256"]:
+        path.unlink()
         raise StudyError(
             "A device of the bank cannot be drawn again",
             f"Case {label['number']} gives another recording than the one that was sealed.",

@@ -95,7 +95,8 @@ def read_real_folder(folder: Path, results_folder: Path | None = None) -> RealFo
             "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
             saved="Nothing was written.",
         )
-    folder = folder.resolve()  # "." has no name
+    if folder.name in ("", ".."):  # the folder has no name of its own; a link keeps that under which its results lie
+        folder = folder.resolve()
     results_path = None if results_folder is None else results_folder.resolve()
     subfolders = sorted(
         path

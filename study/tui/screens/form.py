@@ -229,8 +229,8 @@ class FormScreen(TranslatedScreen[FormReply]):
 
 
 def _compose_message(entry: FormEntry, is_complete: bool, words: Words) -> str:
-    """Compose the line below the form: the first missing answer, or changed answers to be checked, or that all
-    questions are answered; empty otherwise."""
+    """Compose the line below the form: the first missing answer, or changed answers to be checked, or how to
+    send a complete form; empty otherwise."""
     if entry.missing:
         remaining, field = len(entry.missing) - 1, entry.form.fields[entry.missing[0]]
         question_text = (

@@ -63,6 +63,16 @@ def test_settings_without_a_meaning_are_refused(settings, said):
         module.diagnose_values(record_cart(1), MODEL, DiagnosisSettings(**settings))
 
 
+@pytest.mark.parametrize("law", ["coulomb_friction", "drifting_friction", "power_of_speed"])
+def test_any_effect_or_law_that_a_diagnosis_tests_may_be_left_out(monkeypatch, law):
+    def diagnosed(recordings, model, settings, map_, progress):
+        raise RuntimeError(f"diagnosed without {settings.without}")
+
+    monkeypatch.setattr(module, "diagnose", diagnosed)
+    with pytest.raises(RuntimeError, match=f"diagnosed without .*{law}"):
+        module.diagnose_values(record_cart(1), MODEL, DiagnosisSettings(without=(law,)))
+
+
 def test_forces_are_not_compared_where_only_accelerations_were_measured():
     cart = record_cart(1)
     accelerated = replace(cart, response=replace(cart.response, quantity="acceleration", unit="m/s^2"))

@@ -1,10 +1,12 @@
 """What the report says beside the numbers of the primary analysis."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from analysis.psychophysics.hierarchy.objective import LOG_SLOPE_BOUNDS
 from analysis.psychophysics.hierarchy.primary import compute_primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.reports.primary_tables import describe_undetermined, make_primary_section
@@ -19,6 +21,13 @@ def test_slopes_that_few_answers_do_not_tell_are_not_to_be_used():
     assert primary is not None and primary.slope > 20.0
     words = describe_undetermined(primary)
     assert "differ in their slopes: the search ended at its bound" in words and "Do not use the median slope" in words
+
+
+@pytest.mark.parametrize(("bound", "is_said"), [(LOG_SLOPE_BOUNDS[0], True), (LOG_SLOPE_BOUNDS[1], True), (1.0, False)])
+def test_a_median_slope_at_its_bound_is_not_to_be_used(primary, bound, is_said):
+    """Answers of many people, all right above one level and all wrong below it, bound the spread of the slopes only."""
+    words = describe_undetermined(replace(primary, slope=math.exp(bound), slope_log_sd=1.0))
+    assert ("The answers do not determine the median slope: the search ended at its bound" in words) == is_said
 
 
 @pytest.mark.slow

@@ -1,7 +1,9 @@
 """The command line as a script would use it: exit codes, stdout for results, stderr for talk."""
 
+import contextlib
 import io
 import json
+import os
 import sys
 
 import pytest
@@ -87,6 +89,26 @@ def test_what_is_printed_to_be_a_file_is_in_utf_8_on_any_system(monkeypatch, com
     assert main(["protocol", *command]) == 0
     sys.stdout.flush()
     assert out.getvalue().decode("utf-8") == text()
+
+
+def test_a_map_for_a_file_of_another_encoding_in_its_name_is_printed_with_its_reason(tmp_path, monkeypatch, capsys):
+    try:
+        path = tmp_path / os.fsdecode(b"r\xff.csv")
+        path.write_text("a,b\n" + "".join(f"{row},{row % 5}\n" for row in range(50)), "utf-8")
+    except (OSError, UnicodeError):
+        pytest.skip("this file system has no such names")
+    out = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(out, encoding="utf-8"))
+    assert main(["import", str(path), "--out", str(tmp_path / "rec.h5")]) == ExitCode.WRONG_USE
+    sys.stdout.flush()
+    assert out.getvalue().startswith(b"# A map for r?.csv.")
+    assert "needs a map" in capsys.readouterr().err
+
+
+def test_what_is_printed_to_be_a_file_is_also_printed_into_a_text_stream():
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert main(["protocol", "texts", "de"]) == 0
+    assert out.getvalue() == make_language_template("de")
 
 
 @pytest.mark.slow

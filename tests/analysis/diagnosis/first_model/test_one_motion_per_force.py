@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.motion import find_motion_signal
+from analysis.diagnosis.balance.motion import find_motion_signals
 from analysis.diagnosis.data.driven_response import compute_response_significance
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
@@ -13,6 +13,8 @@ from analysis.diagnosis.first_model import fit_without_model
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from analysis.diagnosis.limits import DRIVEN_DEVIATIONS
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError
+from equalizer.signals.recording_checks import list_recording_problems
+from equalizer.signals.signal import Signal
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
 
 
@@ -36,6 +38,21 @@ def test_a_temperature_among_the_commands_is_a_condition():
     assert found.condition is not None
     assert found.condition.channels == ("T",)
     assert "T among the commands" in said
+
+
+def test_a_commanded_temperature_beside_the_measured_one_keeps_a_name_of_its_own():
+    push, heat = smooth_noise(2000, 1), np.linspace(20, 50, 2000)
+    recording = make_recording(
+        [("u", "torque", "N m", push), ("T", "temperature", "K", heat)],
+        [("w", "angular velocity", "rad/s", simulate_speed(push))],
+    )
+    measured = Signal(heat[:, None] - 1, recording.sample_rate_hz, "temperature", "K", ("T",))
+
+    (found,), _ = convert_to_driven_motions((replace(recording, condition=measured),))
+
+    assert found.condition is not None
+    assert found.condition.channels == ("T", "command T")
+    assert list_recording_problems([found]) == ()
 
 
 def test_two_commands_of_one_motion_become_one():
@@ -139,8 +156,7 @@ def test_a_channel_without_a_single_number_is_no_motion_and_no_force():
     """Without a warning, which would be an error here."""
     push, none = smooth_noise(2000, 1), np.full(2000, np.nan)
     moved = make_recording([("f", "force", "N", push)], [("x", "position", "m", none), ("y", "position", "m", push)])
-    assert (moving := find_motion_signal(moved)) is not None
-    assert moving.channels == ("y",)
+    assert find_motion_signals([moved])[0].channels == ("y",)
     pushed = make_recording([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
     assert convert_to_driven_motions((pushed,))[0][0].response.channels == ("f2",)
 
@@ -191,20 +207,24 @@ def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
     assert unsure < DRIVEN_DEVIATIONS
 
 
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["in order", "exchanged"])
-def test_a_refusal_names_responses_that_were_exchanged(monkeypatch, order):
+@pytest.mark.parametrize(
+    ("mixing", "is_exchanged"),
+    [([[1, 0], [0, 1]], False), ([[0, 1], [1, 0]], True), ([[1, 1], [1, -1]], False)],
+    ids=["in order", "exchanged", "both move with both"],
+)
+def test_a_refusal_names_responses_that_were_exchanged(monkeypatch, mixing, is_exchanged):
     def refuse(*_):
         raise MechanicalFitError("the matrix is singular")
 
     pushes = [smooth_noise(3000, seed) for seed in (1, 2)]
-    speeds = [simulate_speed(push, mass) for push, mass in zip(pushes, (0.05, 0.1), strict=True)]
+    speeds = mixing @ np.array([simulate_speed(push, mass) for push, mass in zip(pushes, (0.05, 0.1), strict=True)])
     recording = make_recording(
         [(name, "force", "N", push) for name, push in zip(("fx", "fy"), pushes, strict=True)],
-        [(name, "velocity", "m/s", speeds[k]) for name, k in zip(("vx", "vy"), order, strict=True)],
+        [(name, "velocity", "m/s", speed) for name, speed in zip(("vx", "vy"), speeds, strict=True)],
     )
     monkeypatch.setattr(fit_without_model, "fit_mechanical_model", refuse)
     monkeypatch.setattr(fit_without_model, "_try_rigid_model", lambda *_: None)
     with pytest.raises(NothingToDiagnoseError) as refusal:
         fit_without_model.fit_first_linear_model([recording], lambda share: None)
     said = "vy moves with fx and vx moves with fy: state the responses in the order of the commands that move them"
-    assert refusal.value.problems[1:] == ((said,) if order == (1, 0) else ())
+    assert refusal.value.problems[1:] == ((said,) if is_exchanged else ())

@@ -2,15 +2,16 @@
 
 import math
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from study.errors import StudyError
 from study.evaluation.bank import proof_folder
-from study.evaluation.bank.proof_folder import ANSWER_FILE
+from study.evaluation.bank.proof_folder import ANSWER_FILE, RECORDING_FILE
 from study.evaluation.bank.proof_seals import read_answer
-from study.evaluation.bank.seal_cases import BankPlan, list_drawable_cases, redraw_recording
+from study.evaluation.bank.seal_cases import BankPlan, list_drawable_cases, redraw_recording, write_redrawn_recording
 from study.evaluation.challenge.draw_bank import generate_case
 from study.store.disk.file_errors import UnusableFileError
 
@@ -38,6 +39,14 @@ def test_a_device_of_mujoco_is_not_drawn_again_without_it(tmp_path, monkeypatch)
     with pytest.raises(StudyError, match="MuJoCo, which is not installed") as told:
         redraw_recording(tmp_path, BankPlan(SEED, 1), {"number": 0, "name": "a1b2"})
     assert "pip install" in told.value.do_now
+
+
+def test_a_device_that_is_drawn_otherwise_leaves_no_recording_that_would_be_diagnosed(tmp_path, monkeypatch):
+    """A run of the right version, as the error asks for, draws it anew."""
+    monkeypatch.setattr("study.evaluation.bank.seal_cases.write_recording", lambda path, *_, **__: path.touch())
+    with pytest.raises(StudyError, match="another recording than the one that was sealed"):
+        write_redrawn_recording(tmp_path, SimpleNamespace(recording=None), {"number": 0, "recording_sha256": "other"})
+    assert not (tmp_path / RECORDING_FILE).exists()
 
 
 def test_a_folder_whose_settings_could_not_be_written_is_begun_by_the_next_run(tmp_path, monkeypatch):

@@ -183,6 +183,12 @@ def test_results_in_the_folder_of_the_recordings_are_no_recordings(
     assert (folder / "axis" / "results" / "axis" / "run" / "answer.json").is_file()
 
 
+def test_a_folder_that_is_a_link_keeps_its_name_and_so_its_answers(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(folder / "axis")
+    (recording,) = read_real_folder(tmp_path / "link").recordings
+    assert recording.folder.name == "link"
+
+
 def test_recordings_of_the_same_name_are_reported_before_any_is_diagnosed(folder: Path) -> None:
     """Their results would lie in one folder: each run would find those of the other."""
     (folder / "axis" / "run.csv").write_text("no table")
