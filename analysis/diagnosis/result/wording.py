@@ -88,7 +88,7 @@ def describe_verdict(
         change_text = (
             f": {conjoin([parameter.text for parameter in moved_parameters])}"
             if moved_parameters
-            else ", each within its calibration's standard deviation"
+            else ", each by less than its tolerance"
         )
         error_text = describe_error_change(errors, ("before", "as given"), ("retuned", "re-tuned"), noise_method)
         return f"No physics is missing; parameters of the model are wrong{change_text}. {capitalise(error_text)}."
