@@ -274,8 +274,7 @@ def test_faults_of_a_whole_sensor_need_no_place():
 def test_numbers_that_are_off_by_little_are_said_to_be():
     said = describe_verdict(make_diagnosis("parameters"))
     assert said.startswith(
-        "No physics is missing; parameters of the model are wrong, each by less than its tolerance. "
-        "The"
+        "No physics is missing; parameters of the model are wrong, each by less than its tolerance. The"
     )
 
 
