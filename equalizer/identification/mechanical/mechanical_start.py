@@ -45,16 +45,27 @@ def estimate_rigid_starts(
     m = structure.inputs
     if structure.delayed:
         delays_s = np.linspace(0.0, _MAX_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _TRIAL_DELAY_COUNT)
-        weights = [_compute_weights(spectra, m, floor) for spectra in segments]
-        delay_solutions = [_solve_matrices(segments, structure, weights, float(delay_s)) for delay_s in delays_s]
-        delay_s = float(delays_s[int(np.argmin([residual for _, residual in delay_solutions]))])
+        weights = np.concatenate([_compute_weights(spectra, m, floor).ravel() for spectra in segments])
+        residuals = [
+            _solve_weighted(*_build_regression(segments, structure, float(delay_s)), weights)[1] for delay_s in delays_s
+        ]
+        delay_s = float(delays_s[int(np.argmin(residuals))])
     else:
         delay_s = structure.actuator.delay_s
     triangles = _solve_with_reweighting(segments, structure, floor, delay_s).reshape(3, -1)
+    starts = [_make_start(segments, structure, triangles, delay_s)]
+    if m == 1 and triangles[0, 0] < 0 and structure.signs == (1.0,):
+        starts.append(_make_start(segments, replace(structure, signs=(-1.0,)), -triangles, delay_s))
+    return starts
+
+
+def _make_start(
+    segments: Sequence[SegmentLines], structure: Structure, triangles: FloatArray, delay_s: float
+) -> tuple[Structure, FloatArray]:
+    """Make the structure with its mass scale, and its unknowns (parameters,). triangles: (3, m (m + 1) / 2), entries of
+    mass, damping and stiffness, which are made positive definite; delay_s: delay of the command."""
+    m = structure.inputs
     mass, damping, stiffness = (build_symmetric_matrix(triangle, m) for triangle in triangles)
-    reversed_starts = []
-    if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
-        reversed_starts = estimate_rigid_starts(segments, replace(structure, signs=(-1.0,)), floor)
     eigenvalues, eigenvectors = np.linalg.eigh(mass)
     largest_eigenvalue = max(float(np.abs(eigenvalues).max()), 1e-300)
     mass = (eigenvectors * np.maximum(eigenvalues, _LEAST_EIGENVALUE * largest_eigenvalue)) @ eigenvectors.T
@@ -70,50 +81,53 @@ def estimate_rigid_starts(
         # The rows apply to the axes' motions, of which the axes' own sensors may measure the negative.
         rows = _fit_further_output_rows(segments, m) * np.array(structure.signs)
         unknowns[structure.slices["rows"]] = rows.ravel()
-    return [(structure, unknowns), *reversed_starts]
+    return structure, unknowns
 
 
 def _solve_with_reweighting(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> FloatArray:
-    """Solve for the entries of mass, damping and stiffness as `_solve_matrices`, with weights of the previous
+    """Solve for the entries of mass, damping and stiffness, lower triangles, row by row, with weights of the previous
     solution."""
     m = structure.inputs
-    weights = [_compute_weights(spectra, m, floor) for spectra in segments]
-    entries, _ = _solve_matrices(segments, structure, weights, delay_s)
+    entry_count = 3 * m * (m + 1) // 2
+    rows, target = _build_regression(segments, structure, delay_s)
+    weights = np.concatenate([_compute_weights(spectra, m, floor).ravel() for spectra in segments])
+    entries = _solve_weighted(rows, target, weights)[0][:entry_count]
     for _ in range(_REWEIGHTINGS):
         previous_entries = entries
         matrices = [build_symmetric_matrix(triangle, m) for triangle in entries.reshape(3, -1)]
-        weights = [
-            _compute_weights(spectra, m, floor, _compute_force_noise(spectra, structure, matrices))
-            for spectra in segments
-        ]
-        entries, _ = _solve_matrices(segments, structure, weights, delay_s)
+        weights = np.concatenate(
+            [
+                _compute_weights(spectra, m, floor, _compute_force_noise(spectra, structure, matrices)).ravel()
+                for spectra in segments
+            ]
+        )
+        entries = _solve_weighted(rows, target, weights)[0][:entry_count]
         if np.allclose(entries, previous_entries, rtol=1e-3, atol=0.0):
             break
     return entries
 
 
-def _solve_matrices(
-    segments: Sequence[SegmentLines], structure: Structure, weights: Sequence[FloatArray], delay_s: float
-) -> tuple[FloatArray, float]:
-    """Solve for the entries of mass, damping and stiffness (lower triangles, row by row); also returns the weighted
-    residual sum of squares. weights: (lines, m) per segment."""
-    rows, target = _build_regression(segments, structure, weights, delay_s)
-    solution = solve_scaled(rows, target)
-    m = structure.inputs
-    return solution[: 3 * m * (m + 1) // 2], float(np.sum((target - rows @ solution) ** 2))
+def _solve_weighted(rows: ComplexArray, target: ComplexArray, weights: FloatArray) -> tuple[FloatArray, float]:
+    """Solve rows (n, k) @ x = target (n,), times weights (n,), for real x; also returns the weighted residual sum of
+    squares."""
+    weighted_rows, weighted_target = rows * weights[:, None], target * weights
+    real_rows = np.concatenate([weighted_rows.real, weighted_rows.imag])
+    real_target = np.concatenate([weighted_target.real, weighted_target.imag])
+    solution = solve_scaled(real_rows, real_target)
+    return solution, float(np.sum((real_target - real_rows @ solution) ** 2))
 
 
 def _build_regression(
-    segments: Sequence[SegmentLines], structure: Structure, weights: Sequence[FloatArray], delay_s: float
-) -> tuple[FloatArray, FloatArray]:
-    """Build regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
-    imaginary parts, times the weights (lines, m) of each segment. delay_s: delay of the command that is removed."""
+    segments: Sequence[SegmentLines], structure: Structure, delay_s: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Build regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: a row per
+    segment, line and axis. delay_s: delay of the command that is removed."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
     blocks, targets = [], []
     transient_segments = [i for i, segment in enumerate(segments) if segment.transient]
-    for index, (spectra, weight) in enumerate(zip(segments, weights, strict=True)):
+    for index, spectra in enumerate(segments):
         s = 2j * np.pi * spectra.frequency_hz
         sensor_path = _compute_sensor_path(spectra, structure) * np.exp(-s * delay_s)
         motion = spectra.response[:, :m] * np.array(structure.signs) / sensor_path[:, None]
@@ -130,14 +144,10 @@ def _build_regression(
                 transient_columns[:, axis, first_column : first_column + 3] = s[:, None] ** (
                     np.array([1, 0, -1]) - order
                 )
-        block = np.concatenate([np.stack(columns, axis=2), transient_columns], axis=2) * weight[:, :, None]
+        block = np.concatenate([np.stack(columns, axis=2), transient_columns], axis=2)
         blocks.append(block.reshape(-1, block.shape[2]))
-        targets.append((spectra.command * weight).ravel())
-    complex_rows, complex_targets = np.concatenate(blocks), np.concatenate(targets)
-    return (
-        np.concatenate([complex_rows.real, complex_rows.imag]),
-        np.concatenate([complex_targets.real, complex_targets.imag]),
-    )
+        targets.append(spectra.command.ravel())
+    return np.concatenate(blocks), np.concatenate(targets)
 
 
 def _compute_sensor_path(spectra: SegmentLines, structure: Structure) -> ComplexArray:
