@@ -7,9 +7,9 @@ from pathlib import Path
 
 from protocols.definition.apparatus import SafetySettings
 from study.devices.admission import HAND_STIMULUS_CAP_N, HAND_TOTAL_CAP_N
-from study.devices.drive.realtime_drive import LATE_S
 from study.devices.force_dimension.acceptance import VALID_FOR
 from study.devices.force_dimension.connect import WATCHDOG_S
+from study.devices.governor.plausibility import LATE_S
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "safety.md").read_text("utf-8")

@@ -44,6 +44,7 @@ from study.devices.drive.runner import Runner
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import count_due_ticks
 from study.devices.governor.governor import Governor
+from study.devices.governor.plausibility import LATE_S
 
 READING_TIMEOUT_S = 0.1
 """Longest wait of a caller for a reading (s): a reading takes below 1 ms; a busy computer is late by some 10 ms."""
@@ -92,10 +93,6 @@ class ReadingRequests:
 
 SIMULATED_INTERVAL_S = 0.003
 """Interval (s) between two calls of `run_due_ticks` for a simulated rig, whose ticks may be late. Chosen."""
-
-LATE_S = 0.1
-"""Time without a tick (s) after which a real rig's loop counts as hanging. Chosen: a busy computer is late by some 10
-ms."""
 
 GRACE_S = 0.02
 """Time (s) allowed to a late loop to continue, because it is also late after a suspension of the process. Chosen."""

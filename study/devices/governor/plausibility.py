@@ -45,6 +45,7 @@ from study.devices.governor.cells import (
     SMOOTHED_STIMULUS,
     STALE,
     STALE_TICKS,
+    STALLED,
     STIMULUS_SMOOTHING,
     TICK_S,
     TWICE_SMOOTHED_STIMULUS,
@@ -53,6 +54,10 @@ from study.devices.governor.cells import (
 )
 from study.devices.governor.compiling import njit_inline
 from study.devices.governor.confine import compute_norm, is_bounded
+
+LATE_S = 0.1
+"""Time without a tick (s) after which a real rig's loop counts as hanging; a later reading cannot be compared with the
+one before. Chosen: a busy computer is late by some 10 ms."""
 
 MAX_COMPONENT_M = 0.5
 """A reading with a component (m) of this magnitude or more is treated as invalid, like NaN. Chosen: the
@@ -221,9 +226,12 @@ def find_reading_fault(state: FloatArray, settings: FloatArray, reading: FloatAr
     the ticks since then (ELAPSED_TICKS). Updates the cells of this module in `state`."""
     if not is_bounded(reading, MAX_COMPONENT_M):
         return NOT_A_NUMBER
+    last_x = state[LAST_POSITION]
+    # The program can be stopped between the start of a tick and its reading, where the loop's own check misses it.
+    if state[ELAPSED_TICKS] * settings[TICK_S] > LATE_S and not math.isnan(last_x):
+        return STALLED
     if not compute_norm(reading[0], reading[1], reading[2]) <= settings[WORKSPACE_RADIUS]:
         return OUTSIDE
-    last_x = state[LAST_POSITION]
     if math.isnan(last_x):  # the first reading
         _update_reference(state, settings, reading)
         for i in range(3):

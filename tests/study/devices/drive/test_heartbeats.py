@@ -9,10 +9,11 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.devices.device import Fault
-from study.devices.drive.realtime_drive import LATE_S, RealtimeDrive
+from study.devices.drive.realtime_drive import RealtimeDrive
 from study.devices.drive.runner import CompiledRunner
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.governor.governor import Governor
+from study.devices.governor.plausibility import LATE_S
 from study.devices.safe import SafeDevice
 
 pytestmark = pytest.mark.real_time

@@ -90,6 +90,22 @@ def test_an_encoder_fault_is_cleared_by_the_next_stimulus(bench, rigs):
     assert bench.health().fault is Fault.NONE
 
 
+@pytest.mark.parametrize(("missed_ticks", "fault"), [(90, Fault.JUMPED), (110, Fault.STALLED)])
+@pytest.mark.parametrize("x_m", [0.06, 0.2])
+def test_after_a_pause_within_a_tick_the_pause_is_the_fault_and_not_the_way_gone_meanwhile(
+    bench, rigs, missed_ticks, fault, x_m
+):
+    """The reading is taken after the pause, the tick began before it."""
+    bench.hold(rigs.sine(2.0), 408)
+    bench.governor.record_missed_ticks(missed_ticks)
+    bench.governor.restart_watchdog()
+    bench.lean(x_m, 0.0, 0.0)
+    forces = bench.go_on(100)
+    assert bench.health().fault is (Fault.OUTSIDE if fault is Fault.JUMPED and x_m > 0.12 else fault)
+    assert not forces[-1].any()
+    assert rigs.violations(forces, rigs.LIMITS) == []
+
+
 @pytest.mark.parametrize(
     ("place_m", "fault"),
     [
