@@ -15,7 +15,7 @@ from analysis.evaluation.blind_test.calibration import Calibration
 from analysis.evaluation.blind_test.detection import EffectDraws, collect_effect_draws, compute_rates_by_size
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, create_figure, set_ratio_ticks, style_axes
+from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, create_axes, create_figure, set_ratio_ticks
 
 OUTCOME_MARKS = {
     "right": ("o", BLUE),
@@ -47,9 +47,7 @@ def make_blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibrati
 def _make_thresholds_picture(effects: Sequence[EffectDraws]) -> Picture:
     """Draw the detection thresholds: a row per effect, with the outcome of each device over the effect's strength (0 to
     1)."""
-    figure = create_figure(8.8, 1.3 + 0.21 * len(effects))
-    axes = figure.add_subplot()
-    style_axes(axes)
+    figure, axes = create_axes(8.8, 1.3 + 0.21 * len(effects))
     for row, effect in enumerate(effects):
         for strength, outcome in effect.draws:
             marker, colour = OUTCOME_MARKS[outcome]
@@ -85,9 +83,7 @@ def _make_thresholds_picture(effects: Sequence[EffectDraws]) -> Picture:
 def _make_size_picture(singles: Sequence[Outcome]) -> Picture:
     """Draw the detection curve: share of devices whose effect is named right, over the change of the readings by the
     effect (rms over the noise's rms)."""
-    figure = create_figure(7.4, 3.6)
-    axes = figure.add_subplot()
-    style_axes(axes)
+    figure, axes = create_axes(7.4, 3.6)
     size_bins = compute_rates_by_size(singles)
     axes.set_xscale("log")
     changes = [size_bin.median_change for size_bin in size_bins]
@@ -169,9 +165,7 @@ def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.flo
 
 def _make_reliability_picture(calibration: Calibration) -> Picture:
     """Draw the reliability diagram: share of right names over their stated probability, with the diagonal."""
-    figure = create_figure(5.2, 4.4)
-    axes = figure.add_subplot()
-    style_axes(axes)
+    figure, axes = create_axes(5.2, 4.4)
     axes.plot([0, 1], [0, 1], color=GREY, linewidth=1.0, linestyle="--")
     for probability_bin in calibration.bins:
         axes.vlines(probability_bin.stated, probability_bin.low, probability_bin.high, color=BLUE, linewidth=1.4)

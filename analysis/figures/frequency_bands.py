@@ -10,7 +10,6 @@ from textwrap import fill
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, create_figure, style_axes
@@ -61,8 +60,8 @@ def draw_frequency_bands(
             axes.axvline(edge_hz, color=BLACK, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
     band_axes.set_xscale("log")
     band_axes.set_xlim(lowest_hz, highest_hz)
-    band_axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    band_axes.xaxis.set_minor_formatter(NullFormatter())
+    band_axes.xaxis.set_major_formatter("{x:g}")
+    band_axes.xaxis.set_minor_formatter("")
     band_axes.set_xlabel("Frequency (Hz)")
     return figure
 
@@ -78,8 +77,8 @@ def _draw_coupling(axes: Axes, response: FrequencyResponse, onset: CouplingOnset
             octave_bins.frequency_hz, 100 * compute_worst_coupling(octave_bins.response), color=BLUE, linewidth=1.3
         )
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_formatter("{x:g} %")
+    axes.yaxis.set_minor_formatter("")
     axes.set_ylabel("Worst coupling,\nacross / along")
     axes.axhline(100 * onset.threshold, color=GREY, linewidth=1, linestyle="--")
     axes.annotate(
@@ -96,7 +95,7 @@ def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
     if onset.interval_hz is not None:
         axes.axvspan(*onset.interval_hz, color=VERMILLION, alpha=0.3, linewidth=0)
     axes.plot(frequency_hz, threshold_percent, "o", color=VERMILLION, markersize=6, zorder=4)
-    label = "coupled from the start" if onset.from_the_start else f"coupling begins: {frequency_hz:.1f} Hz"
+    label = "coupled from the start" if onset.is_at_lowest_line else f"coupling begins: {frequency_hz:.1f} Hz"
     axes.annotate(
         label, (frequency_hz, threshold_percent), xytext=(-8, 14), textcoords="offset points", ha="right", fontsize=9,
         color=VERMILLION,

@@ -14,7 +14,18 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.diagnosis.types import Mask
 from analysis.figures.picture import Picture, convert_to_sample_units
-from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, create_figure, style_axes
+from analysis.figures.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREY,
+    MARKERS,
+    ORANGE,
+    SKY,
+    create_axes,
+    create_figure,
+    style_axes,
+)
 from analysis.look.channels import Channel
 from analysis.look.kinematics import KinematicPair, differentiate
 from analysis.look.overview import Overview
@@ -153,9 +164,7 @@ def _select_band_lines(overview: Overview) -> Mask:
 def _make_coherence_picture(overview: Overview, name: str) -> Picture:
     """Make the picture of the multiple coherence of each response with all commands; faint outside the driven band."""
     assert overview.spectra is not None
-    figure = create_figure(8.6, 3.0)
-    panel = figure.subplots()
-    style_axes(panel)
+    figure, panel = create_axes(8.6, 3.0)
     _shade_bands(panel, overview)
     for response_index, coherence in enumerate(overview.coherences):
         colour = COLOURS[response_index % len(COLOURS)]
@@ -187,9 +196,7 @@ def _make_coherence_picture(overview: Overview, name: str) -> Picture:
 def _make_levels_picture(overview: Overview, name: str) -> Picture:
     """Make the picture of the rms of each command and response by segment, relative to its largest; for a linear device
     the curves coincide."""
-    figure = create_figure(8.6, 3.2)
-    panel = figure.subplots()
-    style_axes(panel)
+    figure, panel = create_axes(8.6, 3.2)
     segment_numbers = [level.number for level in overview.levels]
     largest_rms = [max(level.rms[column] for level in overview.levels) for column in range(len(overview.channels))]
     drawn_channels = [

@@ -19,10 +19,9 @@ from analysis.figures.style import (
     PAGE_WIDTH_IN,
     choose_colour,
     choose_height_in,
-    choose_marker,
-    create_figure,
+    create_axes,
+    make_participant_handles,
     set_ratio_ticks,
-    style_axes,
 )
 from analysis.figures.thresholds import draw_threshold
 from analysis.psychophysics.hierarchy.inference import DirectionLimit, MedianThreshold
@@ -35,8 +34,6 @@ _ABOVE_CAP_RATIO, _SMALLEST_TOP_RATIO = 1.12, 1.45
 the cap."""
 _LARGEST_TOP_RATIO, _LEAST_ARROW_RATIO = 8.0, 1.25
 """Largest upper end of the axis, relative to the cap; and smallest ratio of an arrow's upper to its lower end."""
-_MAX_LEGEND_PARTICIPANTS = 24
-"""Largest number of participants that the legend lists."""
 
 
 def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
@@ -46,9 +43,7 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     an arrow that begins at its one-sided lower bound (below it near the end of the axis), without one at the lower end
     of the axis. cap_n: largest force of the staircase, N."""
     legend_handles = _make_legend_handles(primary, cap_n)
-    figure = create_figure(PAGE_WIDTH_IN, choose_height_in(legend_handles, 4.2))
-    axes = figure.add_subplot()
-    style_axes(axes)
+    figure, axes = create_axes(PAGE_WIDTH_IN, choose_height_in(legend_handles, 4.2))
     axes.set_yscale("log")
     top_n, bottom_n = _compute_upper_limit_n(primary, cap_n), _compute_lower_limit_n(primary, cap_n)
     axes.set_ylim(bottom_n, top_n)
@@ -158,16 +153,4 @@ def _make_legend_handles(primary: PrimaryAnalysis, cap_n: float) -> list[Line2D]
         handles.append(Line2D([], [], color=BLACK, marker="D", markerfacecolor="white", markersize=7, linewidth=3.2,
                               label=f"direction limit,\n{confidence_text} interval"))  # fmt: skip
     handles.append(Line2D([], [], color=GREY, linestyle="--", linewidth=1.2, label=f"cap {cap_n:g} N"))
-    if len(primary.persons) <= _MAX_LEGEND_PARTICIPANTS:
-        handles += [
-            Line2D(
-                [],
-                [],
-                color=choose_colour(participant),
-                marker=choose_marker(participant),
-                linewidth=0,
-                label=person.subject,
-            )
-            for participant, person in enumerate(primary.persons)
-        ]
-    return handles
+    return [*handles, *make_participant_handles([person.subject for person in primary.persons])]

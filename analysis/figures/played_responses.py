@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.evaluation.reproduction.played_response import PlayedResponse
 from analysis.figures.picture import Picture
@@ -97,5 +96,5 @@ def _draw_panel(axes: Axes, playback: PlayedResponse, target_axis: int) -> None:
     axes.set_xlim(float(playback.frequency_hz[0]), float(playback.frequency_hz[-1]))
     axes.set_ylim(_LOWEST_DB, _HIGHEST_DB)
     axes.set_xticks(_TICKS_HZ)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")

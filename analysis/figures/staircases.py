@@ -36,14 +36,17 @@ _PANEL_ROW_HEIGHT_IN = 2.2
 
 def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
     """Draw one panel per run, ordered by frequency, session and run; the figure contains a note where there is no run.
-    runs: of a single participant. rule: their staircase rule."""
+    runs: of a single participant; of several sessions, each panel's title names its session. rule: their staircase
+    rule."""
     if not runs:
         return draw_no_data_note(create_figure(PAGE_WIDTH_IN, 2.0), "There is no run to draw.")
     axis_minimum_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
     ordered_runs = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
     figure, panels = create_panel_grid(len(ordered_runs), _PANEL_ROW_HEIGHT_IN)
+    # A participant who came twice has two panels of one frequency.
+    has_several_sessions = len({run.session for run in runs}) > 1
     for panel, run in zip(panels, ordered_runs, strict=False):
-        _draw_staircase(panel, run, rule)
+        _draw_staircase(panel, run, rule, f"Session {run.session}\n" if has_several_sessions else "")
         panel.set_ylim(axis_minimum_n, 1.25 * rule.cap_n)
         set_newton_ticks(panel.yaxis, axis_minimum_n, rule.cap_n)
     label_panel_axes(panels, len(ordered_runs), "Trial", "Level (N)")
@@ -51,9 +54,10 @@ def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
     return figure
 
 
-def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule) -> None:
+def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule, session_line: str) -> None:
     """Draw the levels, answers, reversals and threshold of a run; without a threshold where the run is not complete.
-    The title has 9 points: at 10, the longest outcome would reach into the next panel."""
+    session_line: first line of the title, or empty. The title has 9 points: at 10, the longest outcome would reach into
+    the next panel."""
     style_axes(axes)
     levels_n = np.array([trial.staircase_n for trial in run.answered])
     trial_numbers = np.arange(1, len(levels_n) + 1)
@@ -92,7 +96,7 @@ def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule) -> None:
             zorder=3,
         )
     axes.set_yscale("log")
-    axes.set_title(f"{run.frequency_hz:g} Hz{_describe_outcome(threshold)}", fontsize=9, loc="left")
+    axes.set_title(f"{session_line}{run.frequency_hz:g} Hz{_describe_outcome(threshold)}", fontsize=9, loc="left")
 
 
 def _describe_outcome(threshold: Threshold) -> str:

@@ -24,7 +24,8 @@ CENSORED_MARKER = "$\\uparrow$"
 """Marker in legends for a threshold that the cap (largest level) limited: an arrow upwards."""
 _TICK_MULTIPLES = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
 """Largest number of decades of an axis, and the multiples of powers of ten that are its ticks. Chosen by hand."""
-
+_LARGEST_LEGEND = 24
+"""Largest number of participants for which a legend lists each; with more it lists none. Chosen."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """Raised characters for exponents."""
 
@@ -35,6 +36,22 @@ PAGE_WIDTH_IN = 7.2
 def create_figure(width_in: float, height_in: float) -> Figure:
     """Create an empty white figure with constrained layout."""
     return Figure(figsize=(width_in, height_in), facecolor="white", layout="constrained")
+
+
+def create_axes(width_in: float, height_in: float) -> tuple[Figure, Axes]:
+    """Create a figure with a single panel in the common style."""
+    figure = create_figure(width_in, height_in)
+    axes = figure.add_subplot()
+    style_axes(axes)
+    return figure, axes
+
+
+def make_participant_handles(subjects: Sequence[str]) -> list[Line2D]:
+    """Make the legend's entries of the participants; none where they are more than `_LARGEST_LEGEND`."""
+    return [
+        Line2D([], [], color=choose_colour(index), marker=choose_marker(index), linewidth=0, label=subject)
+        for index, subject in enumerate(subjects if len(subjects) <= _LARGEST_LEGEND else ())
+    ]
 
 
 def choose_height_in(legend_handles: Sequence[Line2D], least_in: float) -> float:

@@ -21,6 +21,7 @@ from analysis.figures.style import (
     choose_marker,
     create_figure,
     draw_no_data_note,
+    make_participant_handles,
     style_axes,
 )
 from analysis.psychophysics.comparisons import ComparisonInterval, Comparisons
@@ -29,8 +30,6 @@ from equalizer.signals.signal import FloatArray
 
 _MARKER_SPREAD_TICKS = 0.5
 """Width over which the participants' markers are spread at each frequency, in distances between ticks. Chosen."""
-_LARGEST_LEGEND = 24
-"""Largest number of participants for which the legend lists each one; with more it lists none. Chosen."""
 _STOPPED_RUN_HEIGHT = 1.07
 """Height at which stopped runs are drawn, as a multiple of the cap: chosen between the cap and the end of the axis."""
 _AXIS_TOP = 1.15
@@ -148,9 +147,4 @@ def _make_legend_handles(table: ThresholdTable, comparisons: Comparisons, cap_n:
     if any(map(any, table.stopped)):
         label = "above the cap: stopped\nby the trial limit"
         handles.append(handle(color=GREY, marker="o", markerfacecolor="none", label=label))
-    if len(table.subjects) <= _LARGEST_LEGEND:
-        handles += [
-            handle(color=choose_colour(index), marker=choose_marker(index), label=subject)
-            for index, subject in enumerate(table.subjects)
-        ]
-    return handles
+    return [*handles, *make_participant_handles(table.subjects)]

@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, create_figure, draw_no_data_note, style_axes
@@ -130,10 +129,10 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
         bins.response[is_in_range & bins.reliable if (is_in_range & bins.reliable).any() else is_in_range]
     )
     axes.set_ylim(0.5 * float(np.quantile(magnitude, 0.01)), 2.0 * float(magnitude.max()))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")
+    axes.yaxis.set_minor_formatter("")
 
 
 def _make_legend_handles(

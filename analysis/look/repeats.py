@@ -102,11 +102,12 @@ def check_repeats(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
                 "from distortion.",
             )
         )
-    if not repeats.noise:
+    if repeats.noise:
+        checks += _check_noise(recording, repeats.noise)
+    elif not checks:
         sentence = "Nothing repeats, so noise cannot be distinguished from errors of a model."
-        checks += [] if checks else [Check(CHECK_NAME, "notice", sentence, "Record some periods more than once.")]
-        return tuple(checks)
-    return (*checks, *_check_noise(recording, repeats.noise))
+        checks.append(Check(CHECK_NAME, "notice", sentence, "Record some periods more than once."))
+    return tuple(checks)
 
 
 def _check_noise(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Check, ...]:

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from analysis.diagnosis.document import NamedEffect, format_law
 from analysis.diagnosis.localisation.localisation_words import write_localisation_sentences
 from analysis.diagnosis.result.error_wording import (
+    describe_balance_errors,
     describe_black_box,
-    describe_ceiling,
     describe_confirmation,
     is_black_box_better,
 )
@@ -44,7 +44,7 @@ from analysis.reports.diagnosis_tables import (
     tabulate_retuned,
     tabulate_rivals,
 )
-from analysis.reports.page import Page, Section, Table, render_page
+from analysis.reports.page import Page, Section, Table, drop_empty, render_page
 from analysis.wording import capitalise
 
 
@@ -59,14 +59,18 @@ def render_diagnosis_report(
         _make_localisation_section(findings, pictures),
         *make_distortion_sections(findings),
         *(_make_effect_section(findings, effect_index, pictures) for effect_index in range(len(diagnosis.effects))),
-        *_make_candidate_sections(findings),
-        *_make_rival_sections(pictures),
+        *drop_empty(
+            Section("What else may be missing", tables=tuple(filter(None, [tabulate_candidates(findings)]))),
+            Section("What else was tried", pictures=_select_pictures(pictures, "rivals")),
+        ),
         _make_error_section(findings, pictures),
         _make_remainder_section(findings, pictures),
         _make_parameter_section(findings),
-        *_make_black_box_sections(findings),
-        *_make_sentence_sections("The next recording", describe_next_experiment(diagnosis)),
-        *_make_remark_sections(findings),
+        *drop_empty(
+            Section("Comparison with a black box", paragraphs=_compare_with_black_box(findings)),
+            Section("The next recording", paragraphs=tuple(filter(None, [describe_next_experiment(diagnosis)]))),
+            Section("Remarks", points=(*describe_doubts(findings), *findings.remarks)),
+        ),
         Section("How this was done", paragraphs=write_method_paragraphs(findings)),
     ]
     return render_page(
@@ -105,17 +109,10 @@ def _make_answer_sections(findings: Findings) -> list[Section]:
     return [Section("What the model lacks", points=(*points, *filter(None, closing_sentences)))]
 
 
-def _make_candidate_sections(findings: Findings) -> list[Section]:
-    """Make the section on the effects that may be missing but are not named; empty without candidates."""
-    table = tabulate_candidates(findings)
-    return [] if table is None else [Section("What else may be missing", tables=(table,))]
-
-
-def _make_black_box_sections(findings: Findings) -> list[Section]:
-    """Make the section that compares the prediction with that of a black-box model; empty without sentences on it."""
+def _compare_with_black_box(findings: Findings) -> tuple[str, ...]:
+    """Write the sentences that compare the prediction with that of a black-box model."""
     comparison_text = describe_black_box(findings.black_box, bool(findings.diagnosis.effects))
-    paragraphs = tuple(filter(None, (*describe_ceiling(findings.balance_errors), comparison_text)))
-    return [Section("Comparison with a black box", paragraphs=paragraphs)] if paragraphs else []
+    return tuple(filter(None, (*describe_balance_errors(findings.balance_errors), comparison_text)))
 
 
 _NO_MAP_SENTENCE = "There is no map: the noise of this recording is not known."
@@ -164,12 +161,6 @@ def _select_signatures(findings: Findings, effect: NamedEffect, pictures: Sequen
     return tuple(picture for picture in pictures if picture.name in names)
 
 
-def _make_rival_sections(pictures: Sequence[Picture]) -> list[Section]:
-    """Make the section with the pictures of rival effects; empty without pictures."""
-    rival_pictures = _select_pictures(pictures, "rivals")
-    return [Section("What else was tried", pictures=rival_pictures)] if rival_pictures else []
-
-
 def _make_error_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
     """Make the section on the prediction errors, in all and by channel, on held-out and on fitted data."""
     tables: list[Table] = [tabulate_errors(findings)]
@@ -207,17 +198,6 @@ def _make_parameter_section(findings: Findings) -> Section:
         points=describe_doubtful_parameters(moved_parameters, findings.fitted),
         tables=(table,) if table is not None else (),
     )
-
-
-def _make_remark_sections(findings: Findings) -> list[Section]:
-    """Make the section of remarks; empty without any."""
-    points = (*describe_doubts(findings), *findings.remarks)
-    return [Section("Remarks", points=points)] if points else []
-
-
-def _make_sentence_sections(heading: str, sentence: str) -> list[Section]:
-    """Make a section with a single sentence; empty for an empty sentence."""
-    return [Section(heading, paragraphs=(sentence,))] if sentence else []
 
 
 def _describe_effect(findings: Findings, effect: NamedEffect) -> str:

@@ -7,7 +7,7 @@ were found, each on the fitted and on held-out data.
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
+from analysis.diagnosis.document import Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import format_estimate, format_place, get_noun
 from analysis.diagnosis.result.candidate_wording import format_candidate_parameters
 from analysis.diagnosis.result.findings import Findings
@@ -85,7 +85,7 @@ def tabulate_errors(findings: Findings) -> Table:
     rows = tuple(
         (
             f"On {_PART_NAMES[part]}",
-            *(_format_stage_error(errors, stage) for stage, _ in _MODEL_STAGES),
+            *(format_error(getattr(errors, stage)) for stage, _ in _MODEL_STAGES),
             format_error(errors.noise),
         )
         for part, errors in (("fit", findings.diagnosis.fit.fit), ("test", findings.diagnosis.fit.test))
@@ -185,12 +185,6 @@ def tabulate_retuned(findings: Findings) -> Table | None:
     )
     header = ("Parameter", "Re-tuned", "Standard deviations", "With the effects found", "Standard deviations")
     return Table("Every free parameter and its change", header, rows, folded=True)
-
-
-def _format_stage_error(errors: Errors, stage: str) -> str:
-    """Format the error of one stage of `_MODEL_STAGES` as text."""
-    error: float | None = getattr(errors, stage)
-    return format_error(error)
 
 
 def _format_ratio(ratio: float) -> str:

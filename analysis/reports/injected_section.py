@@ -42,7 +42,7 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
             (
                 missed_outcome.recording,
                 missed_outcome.injected or "nothing",
-                _format_change(missed_outcome.change),
+                "unknown" if missed_outcome.change is None else f"{missed_outcome.change:.2f}",
                 missed_outcome.answer_class,
                 ", ".join(missed_outcome.named) or "-",
             )
@@ -92,11 +92,6 @@ def _make_tally_table(title: str, heading: str, tallies: Sequence[Tally]) -> Tab
             for tally in tallies
         ),
     )
-
-
-def _format_change(change: float | None) -> str:
-    """Format the ratio of the held-out errors with and without the fault; "unknown" for None."""
-    return "unknown" if change is None else f"{change:.2f}"
 
 
 def format_rate(rate: IntervalEstimate) -> str:

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 
 from analysis.figures.look_pictures import make_look_pictures
 from analysis.figures.picture import Picture
-from analysis.look.check import Check
 from analysis.look.overview import Overview
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.wording import replace_time_units, typeset
@@ -75,17 +74,15 @@ def _make_recording_sections(
 ) -> tuple[Section, ...]:
     """Make the sections of one recording, with its name in the headings where the page shows several."""
     title_suffix = f" of {overview.name}" if len(all_overviews) > 1 else ""
+    check_rows = tuple((check.name, check.level, check.finding, check.advice) for check in overview.checks)
     return (
-        Section(f"Checks{title_suffix}", tables=(_make_check_table(overview.checks),)),
+        Section(
+            f"Checks{title_suffix}",
+            tables=(Table("What was checked", ("Check", "Result", "Seen", "What to do"), check_rows),),
+        ),
         Section(f"Channels{title_suffix}", tables=(_make_channel_table(overview),)),
         Section(f"Pictures{title_suffix}", pictures=tuple(pictures), tables=(_make_segment_table(overview),)),
     )
-
-
-def _make_check_table(checks: Sequence[Check]) -> Table:
-    """Make the table of the checks."""
-    rows = tuple((check.name, check.level, check.finding, check.advice) for check in checks)
-    return Table("What was checked", ("Check", "Result", "Seen", "What to do"), rows)
 
 
 def _make_channel_table(overview: Overview) -> Table:

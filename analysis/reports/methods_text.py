@@ -81,16 +81,12 @@ def _describe_task(protocol: StudyProtocol) -> str:
     feedback_text = "was told" if trial.feedback == "after_answer" else "was not told"
     return (
         f"Every trial played one {_STIMULUS_NOUNS[protocol.stimulus.quantity]} along one of two orthogonal directions, "
-        f"at {first_angle}° (1) and "
-        f"{second_angle}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
-        f"{symmetry_angle}°. The direction was {_DIRECTION_PHRASES[protocol.schedule.directions]}. The participant "
-        "said "
-        f"which of the two it was, {limit_text}, and {feedback_text} whether that was right."
-        + (
-            " A void trial was presented again with the same stimulus: after pauses and faults, and where the "
-            f"participant asked for it, at most {trial.repeats_per_run} times in a run. (Sessions begun before this "
-            "rule drew a new one.)"
-        )
+        f"at {first_angle}° (1) and {second_angle}° (2) in the {directions.plane} plane, mirrored about the linkage's "
+        f"line of symmetry at {symmetry_angle}°. The direction was {_DIRECTION_PHRASES[protocol.schedule.directions]}. "
+        f"The participant said which of the two it was, {limit_text}, and {feedback_text} whether that was right. A "
+        "void trial was presented again with the same stimulus: after pauses and faults, and where the participant "
+        f"asked for it, at most {trial.repeats_per_run} times in a run. (Sessions begun before this rule drew a new "
+        "one.)"
         + (
             " For every second participant the numbers 1 and 2 changed places; the table of trials has the angle."
             if protocol.schedule.labels == "swapped_for_half"

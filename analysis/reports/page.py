@@ -39,6 +39,11 @@ class Section:
     tables: tuple[Table, ...] = ()
 
 
+def drop_empty(*sections: Section) -> list[Section]:
+    """Drop the sections that have a heading only."""
+    return [each for each in sections if each.paragraphs or each.points or each.pictures or each.tables]
+
+
 @dataclass(frozen=True, slots=True)
 class Page:
     """A complete report."""
@@ -64,10 +69,7 @@ def render_page(page: Page) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("page.html.j2").render(page=page, svg=_render_inline_svg)
-
-
-def _render_inline_svg(picture: Picture) -> Markup:
-    """Render a picture as inline SVG, marked so that the template does not escape it again."""
     # Safe as markup: `render_picture_svg` escapes title and description, and Matplotlib the texts of the figure.
-    return Markup(render_picture_svg(picture))
+    return environment.get_template("page.html.j2").render(
+        page=page, svg=lambda picture: Markup(render_picture_svg(picture))
+    )

@@ -12,10 +12,12 @@ from functools import partial
 
 from analysis.psychophysics.declared_result import NOT_CONVERGED_NOTE
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
+from analysis.psychophysics.hierarchy.curve import TARGET_PROPORTION
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.likelihood_thresholds import LikelihoodThreshold, convert_to_newton
 from analysis.psychophysics.hierarchy.objective import LOG_SD_BOUNDS, LOG_SLOPE_BOUNDS
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
+from analysis.psychophysics.hierarchy.single_persons import CRITERION_SD, SLOPE_LOG_SD
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Section, Table
@@ -26,10 +28,10 @@ BOUND_TOLERANCE_LOG = 0.01
 """Distance of the log of a standard deviation or slope from its bound, below which it counts as there. Chosen."""
 INTRODUCTION = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
-    "frequency; slopes and response biases differ by person. An answer at the cap is an answer like any other, "
-    "so nothing is censored and no participant is left out; levels that follow the answers do not bias the "
-    "likelihood. Threshold: the level at which an attentive answer without a bias towards one direction is right in "
-    "79.37 %."
+    "frequency; slopes and response biases differ by person. An answer at the cap is an answer like any other, so "
+    "nothing is censored and no participant is left out; levels that follow the answers do not bias the likelihood. "
+    "Threshold: the level at which an attentive answer without a bias towards one direction is right in "
+    f"{100 * TARGET_PROPORTION:.2f} %."
 )
 RUN_NOTE = (
     "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the model. "
@@ -38,8 +40,8 @@ RUN_NOTE = (
 """Note below the thresholds of single persons, where the model of all answers was fitted."""
 SINGLE_RUN_NOTE = (
     "From the answers at this frequency alone. What a run does not determine is averaged over typical participants: "
-    "slopes within a factor of 1.5, response biases within 0.3 d', few lapses. Above the cap, or below the levels "
-    "played (right answers only): no size, a one-sided bound."
+    f"slopes within a factor of {math.exp(SLOPE_LOG_SD):.1f}, response biases within {CRITERION_SD:g} d', few lapses. "
+    "Above the cap, or below the levels played (right answers only): no size, a one-sided bound."
 )
 """Note below the thresholds of single persons, where there is no model of all answers."""
 CAP_NOTE = "* (†): first (second) median above the cap; the interval has only its lower (upper) end; with both, none."
@@ -94,8 +96,7 @@ def _make_single_section(analysis: StudyAnalysis) -> Section:
 
 
 def _describe_coverage(analysis: StudyAnalysis, analysis_name: str) -> tuple[str, ...]:
-    """Describe the measured coverage of the intervals of one analysis, a name of `coverage_words.INTERVAL_TITLES`;
-    empty where `describe_measured_coverage` is."""
+    """Describe the measured coverage of the intervals of an analysis (a name of `coverage_words.INTERVAL_TITLES`)."""
     return describe_measured_coverage((analysis_name,), analysis.table, analysis.protocol.staircase)
 
 
@@ -122,8 +123,7 @@ def _describe_fit(primary: PrimaryAnalysis) -> str:
 
 
 def describe_far_above(primary: PrimaryAnalysis) -> str:
-    """Describe the frequencies whose medians are too far above the cap (`far_above_hz`) to be compared with each other:
-    a sentence with a leading space; empty with fewer than two such frequencies."""
+    """Describe the medians too far above the cap to be compared: a sentence with a leading space; empty below two."""
     if len(primary.far_above_hz) < 2:
         return ""
     hz_text = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])

@@ -14,7 +14,7 @@ from analysis.evaluation.blind_test.injected_faults import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import list_error_rows
 from analysis.figures.picture import Picture
 from analysis.reports.injected_section import make_injected_section
-from analysis.reports.page import Page, Section, Table, render_page
+from analysis.reports.page import Page, Section, Table, drop_empty, render_page
 from analysis.wording import typeset
 
 VERDICT_WORDS = {
@@ -49,17 +49,12 @@ def render_real_report(
     """Render the report as an HTML page. injected_outcomes: diagnoses of recordings with an injected effect; empty: the
     section is left out. pictures: by folder and recording; a missing picture is left out. provenance: versions and
     inputs by name. generated: local time of the report."""
-    sections = [Section("All recordings", tables=(make_overview_table(answers),))]
-    if unusable_inputs:
-        sections.append(
-            Section(
-                "What could not be used",
-                points=tuple(
-                    f"{unusable_input.location}: {unusable_input.reason}" for unusable_input in unusable_inputs
-                ),
-            )
-        )
-    sections += [_make_recording_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
+    unusable_points = tuple(f"{unusable.location}: {unusable.reason}" for unusable in unusable_inputs)
+    sections = [
+        Section("All recordings", tables=(make_overview_table(answers),)),
+        *drop_empty(Section("What could not be used", points=unusable_points)),
+        *(_make_recording_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers),
+    ]
     if injected_outcomes:
         sections.append(make_injected_section(injected_outcomes))
     named_count = sum(bool(answer.effects) for answer in answers)
@@ -80,22 +75,10 @@ def render_real_report(
 def make_overview_table(answers: Sequence[RealAnswer]) -> Table:
     """Make the table of all recordings: verdict, named effects, held-out errors as shares of the signal, and duration
     of the diagnosis in s."""
-    header = (
-        "recording",
-        "verdict",
-        "named",
-        "as given",
-        "re-tuned",
-        "with the effects found",
-        "black box",
-        "noise",
-        "s",
-    )
-    return Table(
-        "Errors on held-out data, shares of the signal",
-        header,
-        tuple(_format_overview_row(answer) for answer in answers),
-    )
+    named_headings = ("recording", "verdict", "named")
+    error_headings = ("as given", "re-tuned", "with the effects found", "black box", "noise")
+    rows = tuple(_format_overview_row(answer) for answer in answers)
+    return Table("Errors on held-out data, shares of the signal", (*named_headings, *error_headings, "s"), rows)
 
 
 def _format_overview_row(real_answer: RealAnswer) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.cue_section import make_cue_sections
 from analysis.reports.declared_section import make_declared_section
 from analysis.reports.methods_text import compose_methods_text
-from analysis.reports.page import Page, Section, render_page
+from analysis.reports.page import Page, Section, drop_empty, render_page
 from analysis.reports.primary_tables import make_primary_section
 from analysis.reports.study_tables import (
     make_group_table,
@@ -61,7 +61,12 @@ def render_study_report(
     pictures_by_name = {picture.name: picture for picture in pictures}
     sections = [
         *_make_declared_sections(analysis),
-        *_make_model_sections(qualities),
+        *drop_empty(
+            Section(
+                "How good the model of the device is",
+                points=tuple(f"{sessions}: {sentence}" for sessions, sentence in qualities),
+            )
+        ),
         _make_warning_section(analysis),
         *_make_result_sections(analysis, pictures_by_name),
         *_make_supplementary_sections(analysis),
@@ -111,14 +116,6 @@ def _make_declared_sections(analysis: StudyAnalysis) -> list[Section]:
     if not analysis.protocol.stimulus.frequencies_hz:
         return []
     return [make_declared_section(analysis.declaration, analysis.declared_result)]
-
-
-def _make_model_sections(qualities: Sequence[tuple[str, str]]) -> list[Section]:
-    """Make the section on the quality of the models that converted accelerations to forces; empty without models."""
-    if not qualities:
-        return []
-    points = tuple(f"{sessions}: {sentence}" for sessions, sentence in qualities)
-    return [Section("How good the model of the device is", points=points)]
 
 
 def _make_warning_section(analysis: StudyAnalysis) -> Section:

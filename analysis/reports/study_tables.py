@@ -238,7 +238,7 @@ def make_run_table(analysis: StudyAnalysis) -> Table:
         ("Session", lambda row: row.session),
         ("Run", lambda row: str(row.run)),
         ("Hz", lambda row: f"{row.frequency_hz:g}"),
-        ("N", _format_threshold),
+        ("N", lambda row: "stopped" if row.ended is RunEnd.TRIAL_LIMIT else mark_cut(row.threshold_n, row.censored)),
         ("dB re 1 N", lambda row: format_number(row.threshold_db)),
         ("m/s²", lambda row: format_number(row.threshold_mps2, choose_decimals(row.threshold_mps2, significant=1))),
         ("mm", lambda row: format_number(row.threshold_mm, choose_decimals(row.threshold_mm, least=3, significant=1))),
@@ -265,11 +265,6 @@ def make_run_table(analysis: StudyAnalysis) -> Table:
         ),
         folded=True,
     )
-
-
-def _format_threshold(row: Threshold) -> str:
-    """Format the threshold of a run in N, or "stopped" where the trial limit ended it."""
-    return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else mark_cut(row.threshold_n, row.censored)
 
 
 def _format_repeats(row: Threshold) -> str:

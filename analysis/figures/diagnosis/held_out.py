@@ -31,6 +31,10 @@ _EXCERPT_CYCLES = 5.0
 constants of this module."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
 """Bounds of the excerpt's length (s)."""
+_FEWEST_SAMPLES = 8
+"""Fewest samples of an excerpt, if the held-out stretch has as many."""
+_LEAST_VISIBILITY = 0.1
+"""Least visibility (`_compute_visibility`) of a visible change, over the noise's variance."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
 _CANDIDATES_PER_STRETCH = 60
 """Number of candidate excerpts per held-out stretch, evenly spaced."""
@@ -62,8 +66,7 @@ def make_held_out_picture(
     if excerpt is not None:
         excerpt_text = (
             f"Left: {excerpt.series.channels[excerpt.channel]} in {excerpt.series.name}, where the predictions "
-            "differ most; below, the residual of each prediction, with plus and minus twice the noise "
-            "(grey). "
+            "differ most; below, the residual of each prediction, with plus and minus twice the noise (grey). "
         )
     return Picture(
         name="held-out",
@@ -89,8 +92,7 @@ def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, floa
                 candidate = _find_strongest_excerpt(series, change[start:stop], start)
                 if candidate is not None and (most_visible is None or candidate[0] > most_visible[0]):
                     most_visible = candidate
-        # A change counts as visible if `_compute_visibility` is above a tenth of the noise's variance.
-        if most_visible is not None and most_visible[0] > 0.1:
+        if most_visible is not None and most_visible[0] > _LEAST_VISIBILITY:
             return most_visible[1]
     return None
 
@@ -98,8 +100,7 @@ def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, floa
 def _find_strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
     """Find the part of a held-out stretch in which the change is most visible, and its visibility
     (`_compute_visibility`); None if the stretch is empty or the change is zero. change: (n, channels), difference of
-    two predictions in units of the noise. start: index of the stretch's first sample in the series. An excerpt has at
-    least 8 samples (chosen) if the stretch has as many."""
+    two predictions in units of the noise. start: index of the stretch's first sample in the series."""
     if not len(change):
         return None
     channel = int(np.argmax(_compute_visibility(change)))
@@ -110,7 +111,7 @@ def _find_strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) 
     # Period of a sine with the same rms and the same rms slope: 2 pi rms(x) / rms(dx/dt).
     cycle_s = 2 * np.pi * rms / max(rms_step * series.sample_rate_hz, 1e-12)
     length_samples = int(np.clip(_EXCERPT_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
-    length_samples = min(max(length_samples, 8), len(signal))
+    length_samples = min(max(length_samples, _FEWEST_SAMPLES), len(signal))
     candidate_offsets = np.unique(np.linspace(0, len(signal) - length_samples, _CANDIDATES_PER_STRETCH).astype(int))
     visibilities = [
         float(_compute_visibility(signal[offset : offset + length_samples])) for offset in candidate_offsets

@@ -12,6 +12,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from analysis.diagnosis.limits import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.figures.diagnosis.stage_style import STAGES, StageStyle
 from analysis.figures.picture import Picture
@@ -78,9 +79,10 @@ def make_mismatch_map_picture(maps: Maps, input_index: int, unit: str) -> Pictur
         name=f"mismatch-map-{input_index + 1}",
         title=f"Where model and device disagree, driven by {input_}",
         caption="Residual relative to that of noise alone: 1 is noise. Framed: significantly larger than the noise "
-        "and the model's error elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
-        f"octaves, by their lower edge{_describe_levels(maps, input_, unit)}; grey: not driven there; where cells have "
-        f"numbers, those without: below {_MIN_NUMBERED_RATIO:g}." + _describe_groups(maps, input_),
+        f"and the model's error elsewhere, at a false discovery rate of {100 * FALSE_DISCOVERY_RATE:g} %. "
+        "Rows: measured channels; columns: octaves, by their lower edge"
+        f"{_describe_levels(maps, input_, unit)}; grey: not driven there; where cells have numbers, those without: "
+        f"below {_MIN_NUMBERED_RATIO:g}.{_describe_groups(maps, input_)}",
         figure=draw_mismatch_map(maps, input_, unit),
         folded=input_index > 0,
         bitmap=input_index == 0,

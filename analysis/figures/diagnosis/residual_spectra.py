@@ -65,7 +65,7 @@ def _draw_panel(axes: Axes, spectrum: HeldOutSpectrum) -> None:
     for stage, values in ((RETUNED_STAGE, spectrum.retuned), (COMPLETED_STAGE, spectrum.after)):
         axes.loglog(spectrum.frequency_hz, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
     axes.set_title(f"{spectrum.channel} ({typeset_unit(spectrum.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_power_of_ten(value)))
     # Minor ticks would double the time to draw the figure.

@@ -19,7 +19,7 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAGE
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, create_figure, draw_no_data_note, set_ratio_ticks, style_axes
+from analysis.figures.style import BLACK, GREY, create_axes, create_figure, draw_no_data_note, set_ratio_ticks
 from equalizer.effects.placing import find_device_part
 from equalizer.signals.signal import FloatArray
 
@@ -99,9 +99,7 @@ def draw_rivals(
     and is marked."""
     if not explanations:
         return draw_no_data_note(create_figure(7.4, 1.4), "Nothing was tried.")
-    figure = create_figure(8.8, 1.05 + 0.3 * len(explanations))
-    axes = figure.add_subplot()
-    style_axes(axes)
+    figure, axes = create_axes(8.8, 1.05 + 0.3 * len(explanations))
     for row, entry in enumerate(explanations):
         colour = COMPLETED_STAGE.colour if row == 0 and is_accepted else GREY
         axes.plot([entry.training_error, entry.test_error], [row, row], color=colour, linewidth=1.2, zorder=2)

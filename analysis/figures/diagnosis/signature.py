@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.result.findings import Signature
@@ -77,8 +76,8 @@ def draw_signature(signature: Signature) -> Figure:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_ylim(bottom=0.5 * y_factor * float(signature.measured.min()))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("")
     else:
         axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
         if signature.visited_range is not None:

@@ -7,7 +7,7 @@ recording. The number of effects that the diagnosis still returns shows whether 
 
 import json
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from analysis.diagnosis.document import diagnosis_from_json
 from analysis.diagnosis.next_experiment.experiment_menu import Experiment, list_experiments
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
+from study.errors import StudyError
 from study.evaluation.bank.ask_engine import Workers, diagnose_and_count
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
 from study.evaluation.bank.proof_folder import (
@@ -44,6 +45,8 @@ FOLLOW_UP_FOLDER = "next"
 """Folder of the bank of follow-up cases in that of the first bank; each label has the number of the first case."""
 PROPOSED_KEY, RANDOM_KEY = "proposed", "drawn"
 """Keys of the two follow-up cases in a label: with the proposed experiments, and with those drawn at random."""
+PROPOSAL_KEY = "proposal"
+"""Key in a label of the proposal in the answer to the first case."""
 NOISE_SEED = 7
 """Constant in the seeds of a follow-up's noise and random order, which makes them independent of all other draws of a
 case. Any value serves; chosen by hand."""
@@ -61,7 +64,7 @@ def follow_up(
 
     folder: the bank of the first cases; options: the workers, and whether to keep recordings after they are answered;
     on_done: called with the numbers of answered and of all follow-up cases. After an interruption the same call
-    continues. Raises StudyError, such as for a broken seal.
+    continues. Raises StudyError, such as for a broken seal, or where a case was diagnosed again since its follow-up.
     """
     workers, keep_recordings = options
     undecided_cases = [
@@ -75,13 +78,35 @@ def follow_up(
             if not follow_up_bank.get_label_file(case_to_seal.number).exists():
                 _seal_follow_up_cases(folder, follow_up_bank, plan, case_to_seal)
     seal(follow_up_bank)
-    labels = [read_label(follow_up_bank.get_label_file(undecided_case.number)) for undecided_case in undecided_cases]
-    case_names = [label[key]["name"] for label in labels for key in (PROPOSED_KEY, RANDOM_KEY) if key in label]
+    labels = [read_label(follow_up_bank.get_label_file(case.number)) for case in undecided_cases]
+    for label in labels:
+        _require_present_proposal(folder, follow_up_bank, label)
+    case_names = list_case_names(labels)
     diagnose_and_count(follow_up_bank, case_names, workers, on_done, keep=keep_recordings)
     return tuple(
-        _read_follow_up(follow_up_bank, undecided_case, label)
-        for undecided_case, label in zip(undecided_cases, labels, strict=True)
+        _read_follow_up(follow_up_bank, case, label) for case, label in zip(undecided_cases, labels, strict=True)
     )
+
+
+def list_case_names(labels: Iterable[Mapping[str, Any]]) -> list[str]:
+    """List the names of the follow-up cases of these labels."""
+    return [label[key]["name"] for label in labels for key in (PROPOSED_KEY, RANDOM_KEY) if key in label]
+
+
+def _require_present_proposal(folder: ProofFolder, follow_up_bank: ProofFolder, label: Mapping[str, Any]) -> None:
+    """Raise StudyError where a sealed follow-up plays what an earlier answer to its first case proposed: that case was
+    diagnosed again since. A label of an older version does not state the proposal and is accepted."""
+    first_label = read_label(folder.get_label_file(label["number"]))
+    proposal = read_answer(folder.open / first_label["name"]).get("proposal")
+    if label.get(PROPOSAL_KEY, proposal) != proposal:
+        raise StudyError(
+            "A follow-up belongs to an earlier answer",
+            f"Case {label['number']} was diagnosed again, and now proposes other experiments than those in "
+            f"{follow_up_bank.path}.",
+            f"Delete the folder {follow_up_bank.path}, and run the same command again: the experiments are played and "
+            "diagnosed again.",
+            saved="All other answers are kept.",
+        )
 
 
 def _seal_follow_up_cases(
@@ -93,7 +118,11 @@ def _seal_follow_up_cases(
     first_label = read_label(folder.get_label_file(undecided_case.number))
     first_folder = folder.open / first_label["name"]
     proposal = read_answer(first_folder).get("proposal")
-    label: dict[str, Any] = {"number": undecided_case.number, "salt": secrets.token_hex(SALT_BYTES)}
+    label: dict[str, Any] = {
+        "number": undecided_case.number,
+        PROPOSAL_KEY: proposal,
+        "salt": secrets.token_hex(SALT_BYTES),
+    }
     if proposal is not None:
         model = read_mechanical_model(first_folder / MODEL_FILE)
         menu = list_experiments(model, RATE_HZ, proposal["axis"], proposal["level"])

@@ -4,7 +4,6 @@ A blind test diagnoses a bank of simulated cases with concealed effects, whose l
 miss is a case with a wrong answer; a control is an altered input for which the expected answer is known.
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
@@ -16,18 +15,24 @@ from analysis.evaluation.blind_test.wording import (
     format_figure,
 )
 from study.evaluation.bank.prove import BlindTest
+from study.evaluation.bank.sealed_bank import count_unanswered_cases, describe_unanswered_cases
 
 
 def format_blind_test(result: BlindTest) -> Iterator[str]:
-    """Format the summary as lines for the terminal: misses, controls, figures with their 95 % confidence intervals, the
-    expected calibration error of the probabilities where it is known, remarks, the seal of the labels, the folder."""
+    """Format the summary as lines for the terminal: misses, number of controls that were answered as expected and the
+    others with their answers, figures with their 95 % confidence intervals, the expected calibration error of the
+    probabilities where it is known, remarks, the seal of the labels, the folder."""
     score = result.score
     yield f"{len(score.misses)} misses in {len(result.outcomes)} cases"
     for miss in score.misses:
         strength = describe_strengths(miss)
         concealed = f"{describe_concealed(miss)}{f' at {strength}' if strength else ''}"
         yield f"  {miss.number:5d} {miss.kind}, {miss.bank}: {concealed} -> {describe_answer(miss)}"
-    yield from format_controls(result)
+    if result.controls:
+        yield f"{sum(outcome.held for outcome in result.controls)} of {len(result.controls)} controls held"
+    for control in result.controls:
+        if not control.held:
+            yield f"  {control.name}: {', then '.join(control.said)}"
     yield ""
     for figure in score.figures:
         yield f"{figure.name:52s} {format_figure(figure)}"
@@ -41,16 +46,6 @@ def format_blind_test(result: BlindTest) -> Iterator[str]:
     yield f"Everything is in {result.folder.path}"
 
 
-def format_controls(result: BlindTest) -> Iterator[str]:
-    """Format the number of controls that were answered as expected, and each other control with its answers, as
-    lines."""
-    if result.controls:
-        yield f"{sum(outcome.held for outcome in result.controls)} of {len(result.controls)} controls held"
-    for control in result.controls:
-        if not control.held:
-            yield f"  {control.name}: {', then '.join(control.said)}"
-
-
 def list_remarks(result: BlindTest) -> Iterator[str]:
     """List the limitations of this blind test as sentences: cases that were left out or have no answer, answers of
     several versions of the code."""
@@ -59,12 +54,7 @@ def list_remarks(result: BlindTest) -> Iterator[str]:
             f"{result.omitted_cases} cases of the second physics engine were left out: MuJoCo is not installed "
             "(pip install 'hapteq[prove]')."
         )
-    if unanswered_count := count_unanswered_cases(result):
-        subject = "1 case has no answer" if unanswered_count == 1 else f"{unanswered_count} cases have no answer"
-        yield (
-            f"{subject}, because the processes were killed or took too long: counted as failed diagnoses. Run the same "
-            "command again to repeat them."
-        )
+    yield from describe_unanswered_cases(result.outcomes)
     if set(result.other_engines) - set(result.engines):
         yield (
             "Follow-ups and controls were answered by another version of the diagnosis "
@@ -77,12 +67,6 @@ def list_remarks(result: BlindTest) -> Iterator[str]:
         )
 
 
-def count_unanswered_cases(result: BlindTest) -> int:
-    """Count the cases whose process ended without an answer or was killed at every attempt: they have no duration
-    (NaN), whereas a diagnosis that raised an error has one."""
-    return sum(outcome.diagnosis is None and math.isnan(outcome.seconds) for outcome in result.outcomes)
-
-
 def summarise_blind_test(result: BlindTest) -> dict[str, Any]:
     """Summarise the blind test as JSON values; each figure with its value, 95 % confidence interval and number of
     cases."""
@@ -90,7 +74,7 @@ def summarise_blind_test(result: BlindTest) -> dict[str, Any]:
         "folder": str(result.folder.path),
         "cases": len(result.outcomes),
         "left_out": result.omitted_cases,
-        "unanswered": count_unanswered_cases(result),
+        "unanswered": count_unanswered_cases(result.outcomes),
         "seal": result.seal,
         "engines": list(result.engines),
         "figures": {

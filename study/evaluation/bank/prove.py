@@ -4,7 +4,7 @@ Order: draw and seal the cases, diagnose them in separate processes without acce
 with answers, follow up undecided cases, run the controls if they are requested, score. Begin at `prove`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,8 +16,9 @@ from analysis.evaluation.blind_test.outcome import ConcealedEffect, Outcome
 from analysis.evaluation.blind_test.score import Score, compute_score
 from study.errors import convert_interrupts
 from study.evaluation.bank.ask_engine import diagnose_and_count
-from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up
+from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up, list_case_names
 from study.evaluation.bank.proof_folder import ProofFolder, hold_proof_folder, open_proof_folder
+from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import (
     BankPlan,
@@ -51,6 +52,8 @@ def make_outcome(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
     )
 
 
+CONTROLS_FOLDER = "controls"
+"""Folder of the controls in that of the bank, with a folder for each seed."""
 CONTROL_REPETITIONS = 3
 """Number of repetitions of all controls, with the seeds plan.seed, plan.seed + 1, … Chosen."""
 
@@ -88,49 +91,38 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
         # Not those that can be drawn here: the bank may have been sealed on a machine with MuJoCo.
         case_numbers = [number for number in range(plan.cases) if folder.get_label_file(number).exists()]
         case_names = read_case_names(folder, case_numbers)
-        _answer_cases(folder, plan, options, dict(zip(case_names, case_numbers, strict=True)), on_progress)
+        restore_recordings(
+            folder,
+            dict(zip(case_names, case_numbers, strict=True)),
+            lambda case_folder, label: redraw_recording(case_folder, plan, label),
+        )
+        diagnose_and_count(
+            folder, case_names, options.diagnosis_workers, partial(on_progress, "diagnosing"), keep=options.keep
+        )
         outcomes = reveal_bank(folder, plan.cases, make_outcome)
         follow_ups = follow_up(
             folder, plan, outcomes, (options.diagnosis_workers, options.keep), partial(on_progress, "following up")
         )
-        controls = _run_all_controls(path, plan, options, on_progress)
+        control_seeds = range(plan.seed, plan.seed + CONTROL_REPETITIONS) if options.controls else ()
+        controls = tuple(
+            control
+            for seed in control_seeds
+            for control in run_controls(
+                path / CONTROLS_FOLDER / str(seed), seed, options.diagnosis_workers, partial(on_progress, "controls")
+            )
+        )
     return BlindTest(
         folder, plan, seal, outcomes, compute_score(outcomes, follow_ups), list_engine_digests(folder, case_names),
-        _collect_other_digests(path), controls, follow_ups, plan.cases - len(case_numbers),
+        _collect_other_digests(path, follow_ups, control_seeds), controls, follow_ups, plan.cases - len(case_numbers),
     )  # fmt: skip
 
 
-def _collect_other_digests(path: Path) -> tuple[str, ...]:
-    """Collect the digests of the code that answered follow-ups and controls, sorted, each once."""
-    folders = [
-        ProofFolder(path / FOLLOW_UP_FOLDER),
-        *(ProofFolder(control_folder) for control_folder in sorted(path.glob("controls/*"))),
-    ]
-    digests = {
-        digest
-        for folder in folders
-        for digest in list_engine_digests(folder, [case_folder.name for case_folder in folder.open.glob("*")])
-    }
+def _collect_other_digests(path: Path, follow_ups: Sequence[FollowUp], control_seeds: Sequence[int]) -> tuple[str, ...]:
+    """Collect the digests of the code that answered these follow-ups and controls, sorted, each once."""
+    follow_up_bank = ProofFolder(path / FOLLOW_UP_FOLDER)
+    labels = (read_label(follow_up_bank.get_label_file(follow_up.number)) for follow_up in follow_ups)
+    digests = set(list_engine_digests(follow_up_bank, list_case_names(labels)))
+    for seed in control_seeds:
+        folder = ProofFolder(path / CONTROLS_FOLDER / str(seed))
+        digests.update(list_engine_digests(folder, [case_folder.name for case_folder in folder.open.glob("*")]))
     return tuple(sorted(digests))
-
-
-def _answer_cases(
-    folder: ProofFolder, plan: BankPlan, options: BankOptions, numbers_by_name: Mapping[str, int], on_progress: Progress
-) -> None:
-    """Diagnose the cases that have no answer yet; a deleted recording is drawn again. numbers_by_name: number of
-    each case by its name."""
-    restore_recordings(folder, numbers_by_name, lambda case_folder, label: redraw_recording(case_folder, plan, label))
-    diagnose_and_count(
-        folder, tuple(numbers_by_name), options.diagnosis_workers, partial(on_progress, "diagnosing"), keep=options.keep
-    )
-
-
-def _run_all_controls(
-    path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress
-) -> tuple[ControlOutcome, ...]:
-    """Run the controls `CONTROL_REPETITIONS` times; empty where the options do not request them."""
-    outcomes: tuple[ControlOutcome, ...] = ()
-    for seed in range(plan.seed, plan.seed + CONTROL_REPETITIONS) if options.controls else ():
-        control_folder = path / "controls" / str(seed)
-        outcomes += run_controls(control_folder, seed, options.diagnosis_workers, partial(on_progress, "controls"))
-    return outcomes

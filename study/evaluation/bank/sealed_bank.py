@@ -4,12 +4,14 @@ A label is revealed only if its SHA-256 is the sealed hash, and an answer counts
 files (`proof_seals`).
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from math import isnan
 from typing import Any, TypeVar
 
 from analysis.diagnosis.document import diagnosis_from_json
+from analysis.evaluation.blind_test.outcome import AnsweredCase
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.bank.proof_folder import ANSWER_FILE, ProofFolder
 from study.evaluation.bank.proof_seals import (
@@ -91,6 +93,22 @@ def collect_answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any])
         "channel_errors": answer.get("channel_errors", {}),
         "seconds": answer.get("cpu_seconds", float("nan")),
     }
+
+
+def count_unanswered_cases(outcomes: Iterable[AnsweredCase]) -> int:
+    """Count the cases whose process ended without an answer or was killed at every attempt: they have no duration
+    (NaN), whereas a diagnosis that raised an error has one."""
+    return sum(outcome.diagnosis is None and isnan(outcome.seconds) for outcome in outcomes)
+
+
+def describe_unanswered_cases(outcomes: Iterable[AnsweredCase]) -> Iterator[str]:
+    """Yield a sentence on the cases that `count_unanswered_cases` counts, if there are any."""
+    if unanswered_count := count_unanswered_cases(outcomes):
+        subject = "1 case has no answer" if unanswered_count == 1 else f"{unanswered_count} cases have no answer"
+        yield (
+            f"{subject}, because the processes were killed or took too long: counted as failed diagnoses. Run the same "
+            "command again to repeat them."
+        )
 
 
 def list_engine_digests(folder: ProofFolder, case_names: Iterable[str]) -> tuple[str, ...]:

@@ -4,11 +4,13 @@ The table was sealed by its SHA-256 before the diagnoses (`hapteq kit seal`). It
 that were changed afterwards are refused. `analysis.evaluation.blind_test.lab_kit` defines which diagnoses are right.
 """
 
+import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.diagnosis.document import Diagnosis
+from analysis.diagnosis.document import FORMAT, VERSION, Diagnosis
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.lab_kit import (
     NO_DIAGNOSIS,
@@ -21,6 +23,7 @@ from analysis.evaluation.blind_test.lab_kit import (
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import make_seal_path, read_labels, read_sealed_hash
 from study.store.disk.csv_rows import format_csv_table
+from study.store.disk.json_document import read_json
 from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
@@ -47,8 +50,8 @@ def score_kit(table_path: Path, diagnoses_folder: Path, scores_path: Path, seal:
     """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `scores_path` as CSV.
     diagnoses_folder: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed
     over before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError where
-    the hashes differ or there is no seal, the table is invalid, no diagnosis is found, one is unusable, or the scores
-    cannot be written."""
+    the hashes differ or there is no seal, the table is invalid, no diagnosis is found, one is unusable, two are of one
+    recording, or the scores cannot be written."""
     table_hash = compute_sha256(table_path)
     compared_with = _require_sealed_hash(table_path, table_hash, seal)
     labels = read_labels(table_path)
@@ -88,7 +91,7 @@ def _format_missed_label(scored_label: ScoredLabel) -> str:
 
 def _read_diagnoses(diagnoses_folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
     """Read the diagnosis of each label, in order; None for a label without a diagnosis. Raises StudyError where the
-    folder is missing, no label has a diagnosis, or a diagnosis is unusable."""
+    folder is missing, no label has a diagnosis, a diagnosis is unusable, or two are of one recording."""
     if not diagnoses_folder.is_dir():
         raise StudyError(
             "There is no such folder",
@@ -98,6 +101,10 @@ def _read_diagnoses(diagnoses_folder: Path, labels: tuple[Label, ...]) -> tuple[
         )
     diagnoses = tuple(_read_one_diagnosis(diagnoses_folder, label.recording) for label in labels)
     if any(diagnosis is not None for diagnosis in diagnoses):
+        _require_own_recordings(
+            diagnoses_folder,
+            [label.recording for label, found in zip(labels, diagnoses, strict=True) if found is not None],
+        )
         return diagnoses
     raise StudyError(
         "There is no diagnosis to score",
@@ -123,6 +130,27 @@ def _read_one_diagnosis(diagnoses_folder: Path, recording_name: str) -> Diagnosi
             f"Get {path.parent} again as `hapteq diagnose` wrote it, or move it away: then it counts as not right.",
             saved=NOTHING_SCORED,
         ) from error
+
+
+def _require_own_recordings(diagnoses_folder: Path, recording_names: Sequence[str]) -> None:
+    """Raise StudyError where two diagnoses are of one recording (file name and content), as in a copied folder: it
+    would count twice. A diagnosis whose file states no recording is not compared."""
+    names_by_recording: dict[str, str] = {}
+    for name in recording_names:
+        provenance = read_json(diagnoses_folder / name / DIAGNOSIS_NAME, FORMAT, VERSION).get("provenance")
+        parents = provenance.get("parents") if isinstance(provenance, dict) else None
+        if not isinstance(parents, list) or not parents:
+            continue
+        other_name = names_by_recording.setdefault(json.dumps(parents[0]), name)
+        if other_name != name:
+            raise StudyError(
+                "Two diagnoses are of the same recording",
+                f"{other_name}/{DIAGNOSIS_NAME} and {name}/{DIAGNOSIS_NAME} in {diagnoses_folder} were made from one "
+                "file: one of the folders is a copy.",
+                f"Diagnose the recordings {other_name} and {name} each into its folder, or move the copy away: then it "
+                "counts as not right.",
+                saved=NOTHING_SCORED,
+            )
 
 
 def _require_sealed_hash(table_path: Path, table_hash: str, seal: str | None) -> str:

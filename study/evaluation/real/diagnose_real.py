@@ -7,7 +7,6 @@
 A recording that cannot be diagnosed gets the verdict "refused", with the reason as its answer.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStret
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
@@ -225,13 +224,14 @@ def _test_on_recording(test_map: FoundMap, real_recording: RealRecording, findin
     in the map). The sign of the commands is not chosen again for this recording (may_reverse=False): it was decided
     once, for all recordings of the device. A recording that cannot be used gives a test with the problem as text."""
     title, has_free_gain = test_map.source.map.title, test_map.source.map.diagnosis.volume_free
+    retuned_model = findings.retuned
+    assert retuned_model is not None  # the findings of an answered recording always have it
     try:
         recording = import_real_recording(test_map)
         if _allows_force_balance(real_recording):
             (recording,) = convert_all_to_force_driven(convert_to_driven_motions((recording,), may_reverse=False)[0])
         retuned_error, improved_error = (
-            compute_prediction_error(recording, model, "all")
-            for model in (_require_retuned(findings), findings.improved)
+            compute_prediction_error(recording, model, "all") for model in (retuned_model, findings.improved)
         )
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         problem_text = problem.happened if isinstance(problem, StudyError) else f"{problem}."
@@ -261,12 +261,6 @@ def _make_full_record_stretches(
     )
 
 
-def _require_retuned(findings: Findings) -> MechanicalModel:
-    """Return the re-tuned model, which the findings of an answered recording always have."""
-    assert findings.retuned is not None
-    return findings.retuned
-
-
 def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: Findings) -> PairOutcome:
     """Compare the recordings before and after a change of the device: the named effects, and the errors of the model
     before and after it was re-tuned and effects were added. Both recordings must exist."""
@@ -276,8 +270,8 @@ def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: 
     test_errors = findings.diagnosis.fit.test
     return PairOutcome(
         changed=real_recording.changed,
-        before=_join_file_names(real_recording.reference.files),
-        after=_join_file_names(real_recording.found_map.files),
+        before=", ".join(path.name for path in real_recording.reference.files),
+        after=", ".join(path.name for path in real_recording.found_map.files),
         verdict=findings.diagnosis.verdict,
         named=describe_named_effects(findings),
         returned=findings.diagnosis.returned_set,
@@ -287,8 +281,3 @@ def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: 
         with_effects=test_errors.after if findings.diagnosis.effects else None,
         expected_left=reference_errors.without_gain,
     )
-
-
-def _join_file_names(files: Sequence[Path]) -> str:
-    """Join the names of files with commas."""
-    return ", ".join(path.name for path in files)

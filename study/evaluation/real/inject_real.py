@@ -18,7 +18,7 @@ from analysis.evaluation.blind_test.injected_faults import InjectedOutcome, read
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
-from study.evaluation.bank.ask_engine import Workers, diagnose_cases, is_answered
+from study.evaluation.bank.ask_engine import Workers, diagnose_and_count
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
 from study.evaluation.bank.proof_folder import (
     CLEAN_FOLDER,
@@ -171,14 +171,5 @@ def run_injections(
     folder = open_proof_folder(path, seed, False)
     with hold_proof_folder(folder):
         case_names = seal_injections(folder, injectable_recordings, count, seed)
-        answered_count = sum(is_answered(folder.open / name) for name in case_names)
-        on_done(answered_count, count)
-
-        def count_answer(name: str) -> None:
-            """Report one more diagnosed case."""
-            nonlocal answered_count
-            answered_count += 1
-            on_done(answered_count, count)
-
-        diagnose_cases(folder, case_names, workers, count_answer)
+        diagnose_and_count(folder, case_names, workers, on_done, keep=True)
     return reveal_bank(folder, count, read_outcome)

@@ -11,7 +11,7 @@ from pathlib import Path
 from analysis.reports.real_report import UnusableInput
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.errors import StudyError
-from study.importing.map_library import FoundMap, find_maps_for_folder, make_map_from_headers
+from study.importing.map_library import FoundMap, find_maps_for_folder, list_data_files, make_map_from_headers
 from study.importing.model_library import find_model_path
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
@@ -81,13 +81,13 @@ class RealFolder:
     recordings: tuple[RealRecording, ...]
     """Recordings to diagnose."""
     troubles: tuple[UnusableInput, ...]
-    """Sub-folders (or the folder itself, where it has none) that could not be used, with the reason."""
+    """Sub-folders, and the folder itself where none of them has recordings, that could not be used, with the reason."""
 
 
 def read_real_folder(folder: Path, results_folder: Path | None = None) -> RealFolder:
-    """Find the recordings of the sub-folders in alphabetical order, or of the folder itself where it has no
-    sub-folders. Names that begin with a dot are left out, and `results_folder`, which may lie in the folder. Raises
-    StudyError where there is no such folder."""
+    """Find the recordings of the sub-folders in alphabetical order, or those of the folder itself where no sub-folder
+    has any. Left out are names that begin with a dot, and `results_folder`, which may lie in the folder, with the
+    folders in which it lies if these hold no files. Raises StudyError where there is no such folder."""
     if not folder.is_dir():
         raise StudyError(
             "There is no such folder",
@@ -98,28 +98,33 @@ def read_real_folder(folder: Path, results_folder: Path | None = None) -> RealFo
     if folder.name in ("", ".."):  # the folder has no name of its own; a link keeps that under which its results lie
         folder = folder.resolve()
     results_path = None if results_folder is None else results_folder.resolve()
-    subfolders = sorted(
-        path
-        for path in folder.iterdir()
-        if path.is_dir() and not path.name.startswith(".") and path.resolve() != results_path
-    )
     recordings: list[RealRecording] = []
     troubles: list[UnusableInput] = []
-    for subfolder in subfolders or [folder]:
-        try:
-            new_recordings = _select_recordings(
-                subfolder, find_maps_for_folder(subfolder) or (make_map_from_headers(subfolder),)
-            )
-        except (StudyError, OSError) as problem:
-            troubles.append(UnusableInput(subfolder.name, _describe_problem(problem)))
-            continue
-        recordings += new_recordings
+    for subfolder in sorted(folder.iterdir()):
+        if subfolder.is_dir() and not subfolder.name.startswith(".") and not _holds_results(subfolder, results_path):
+            _add_recordings(subfolder, recordings, troubles)
+    # With sub-folders that are none of recordings, such as earlier results, its own recordings count all the same.
+    if not recordings and (not troubles or list_data_files(folder)):
+        _add_recordings(folder, recordings, troubles)
     return RealFolder(tuple(recordings), tuple(troubles))
 
 
-def _describe_problem(problem: StudyError | OSError) -> str:
-    """Describe why a sub-folder could not be used, as a sentence."""
-    return problem.happened if isinstance(problem, StudyError) else f"{problem.strerror or problem}."
+def _holds_results(folder: Path, results_path: Path | None) -> bool:
+    """Whether a folder is that of the results, or one without files in which that lies."""
+    path = folder.resolve()
+    return results_path is not None and (
+        path == results_path or (path in results_path.parents and not list_data_files(folder))
+    )
+
+
+def _add_recordings(folder: Path, recordings: list[RealRecording], troubles: list[UnusableInput]) -> None:
+    """Add the recordings of a folder to the list, or the reason why it cannot be used to `troubles`."""
+    try:
+        found_maps = find_maps_for_folder(folder) or (make_map_from_headers(folder),)
+        recordings += _select_recordings(folder, found_maps)
+    except (StudyError, OSError) as problem:
+        reason = problem.happened if isinstance(problem, StudyError) else f"{problem.strerror or problem}."
+        troubles.append(UnusableInput(folder.name, reason))
 
 
 def _select_recordings(folder: Path, found_maps: Sequence[FoundMap]) -> list[RealRecording]:
@@ -171,14 +176,9 @@ def _find_reference(found_map: FoundMap, found_maps: Sequence[FoundMap]) -> tupl
                 (
                     candidate
                     for candidate in found_maps
-                    if candidate.source is found_map.source and _fits_pattern(candidate, pair.before)
+                    if candidate.source is found_map.source and candidate.files[0].match(pair.before)
                 ),
                 None,
             )
             return reference, pair.changed if reference is not None else ""
     return None, ""
-
-
-def _fits_pattern(found_map: FoundMap, pattern: str) -> bool:
-    """Whether the first file of a recording matches a pattern of file names."""
-    return found_map.files[0].match(pattern)

@@ -9,9 +9,9 @@ last 2 % of the progress are for page and table.
 import errno
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,7 +33,14 @@ from study.evaluation.real.reuse_answers import (
     gather_answer_provenance,
     locate_answer_folder,
 )
-from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real_results
+from study.evaluation.real.write_real import (
+    INJECTED_TABLE_NAME,
+    PAGE_NAME,
+    TABLE_NAME,
+    RealResults,
+    WrittenReal,
+    write_real_results,
+)
 from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import CannotWriteError
@@ -55,8 +62,7 @@ MAX_EVALUATIONS = 4000
 """Largest number of evaluations (structures compared, laws simulated or fitted) in the search for one recording, which
 then ends with its best result. Chosen. A limit in seconds would make answers depend on the load of the machine."""
 MAX_TASKS_IN_FLIGHT = 16
-"""Largest number of recordings that are submitted to an executor at a time: each is sent with all files of its
-sub-folder, which are in memory until then. Chosen."""
+"""Largest number of recordings submitted to an executor at a time, with all files of their sub-folders. Chosen."""
 OVERHEAD_S = 25.0
 """Processor time (s) per recording for all work other than the search (fit of a model, page, figures), where
 `RealPlan.seconds` is given. Chosen."""
@@ -113,7 +119,7 @@ def diagnose_folder(
 
 def _list_recordings(plan: RealPlan) -> RealFolder:
     """List the recordings of the folder. Raises WrongUseError for seconds that are not finite, StudyError without a
-    recording."""
+    recording or where a sub-folder has the name of a result."""
     if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(
             "This is not a valid number of seconds",
@@ -122,6 +128,15 @@ def _list_recordings(plan: RealPlan) -> RealFolder:
             saved="Nothing was written.",
         )
     real_folder = read_real_folder(plan.folder, plan.out)
+    result_names = {PAGE_NAME, TABLE_NAME, INJECTED_TABLE_NAME, *((INJECTED_NAME,) if plan.inject else ())}
+    folder_names = {recording.folder.name for recording in real_folder.recordings}
+    if taken_names := sorted(name for name in folder_names if name.lower() in result_names):
+        raise StudyError(
+            "A sub-folder has the name of a result",
+            f"In {plan.out}, {', '.join(taken_names)} would hold the results of that sub-folder and of all.",
+            f"Rename the sub-folder, and likewise the folder of its results in {plan.out}, if there is one.",
+            saved="Nothing was written.",
+        )
     if real_folder.recordings:
         return real_folder
     raise StudyError(
@@ -148,16 +163,15 @@ def _inject_faults(
     """Make `plan.inject` cases of diagnosed recordings and injected faults, and diagnose them; empty where it is 0."""
     if plan.inject == 0:
         return ()
-    start_share = DIAGNOSIS_SHARE
-    on_progress("injecting faults", start_share)
-    injectable_recordings = load_injectable_recordings(plan.out, real_folder.recordings, answers)
-
-    def report_progress(done: int, total: int) -> None:
-        """Report the number of finished injections."""
-        on_progress(f"injected faults, {done} of {total}", start_share + (0.98 - start_share) * done / max(total, 1))
-
+    on_progress("injecting faults", DIAGNOSIS_SHARE)
     return run_injections(
-        plan.out / INJECTED_NAME, injectable_recordings, (plan.inject, plan.seed), report_progress, workers
+        plan.out / INJECTED_NAME,
+        load_injectable_recordings(plan.out, real_folder.recordings, answers),
+        (plan.inject, plan.seed),
+        lambda done, total: on_progress(
+            f"injected faults, {done} of {total}", DIAGNOSIS_SHARE + (0.98 - DIAGNOSIS_SHARE) * done / total
+        ),
+        workers,
     )
 
 
@@ -171,12 +185,7 @@ def _diagnose_in_process(
     """Diagnose the recordings in order in this process, except those in `reused_answers` (by answer folder); returns
     all answers in order. With `plan.seconds`, the remaining time of a sub-folder is divided evenly among its
     remaining recordings, less `OVERHEAD_S` each; each gets at least a tenth of `plan.seconds`."""
-    answers, recording_count, end_share = (
-        [],
-        max(len(real_folder.recordings), 1),
-        DIAGNOSIS_SHARE if plan.inject else 0.98,
-    )
-    limit_s = plan.seconds or 0.0
+    answers, end_share, limit_s = [], DIAGNOSIS_SHARE if plan.inject else 0.98, plan.seconds or 0.0
     remaining_s = dict.fromkeys((listed_recording.folder.name for listed_recording in real_folder.recordings), limit_s)
     for index, recording in enumerate(real_folder.recordings):
         remaining_count = sum(candidate.folder == recording.folder for candidate in real_folder.recordings[index:])
@@ -188,7 +197,7 @@ def _diagnose_in_process(
         ) -> None:
             on_progress(
                 f"{real_recording.folder.name}, {real_recording.name}: {step}",
-                end_share * (index + min(share, 1.0)) / recording_count,
+                end_share * (index + min(share, 1.0)) / len(real_folder.recordings),
             )
 
         reused_answer = reused_answers.get(locate_answer_folder(plan.out, recording))
@@ -207,14 +216,10 @@ def _diagnose_on_executor(
     """Diagnose the recordings without an answer in `reused_answers` on the workers of the executor, which return the
     files of the results; returns all answers in order."""
     answer_paths = [locate_answer_folder(plan.out, real_recording) for real_recording in real_folder.recordings]
-    unanswered = [
-        (answer_path, real_recording)
-        for answer_path, real_recording in zip(answer_paths, real_folder.recordings, strict=True)
-        if answer_path not in reused_answers
-    ]
     tasks = (
         (answer_path, (real_recording.folder.name, real_recording.name, read_files(real_recording.folder)))
-        for answer_path, real_recording in unanswered
+        for answer_path, real_recording in zip(answer_paths, real_folder.recordings, strict=True)
+        if answer_path not in reused_answers
     )
     answers, end_share = dict(reused_answers), DIAGNOSIS_SHARE if plan.inject else 0.98
     for answer_path, files in run_tasks(executor, diagnose_sent_recording, tasks, MAX_TASKS_IN_FLIGHT):
@@ -286,12 +291,10 @@ def _write_diagnosis(folder: Path, result: RealDiagnosis, origin: Provenance) ->
         write_real_answer(answer_folder / ANSWER_NAME, result.answer, origin)
 
 
-@contextmanager
-def _create_folder_with_parents(folder: Path) -> Iterator[Path]:
+def _create_folder_with_parents(folder: Path) -> AbstractContextManager[Path]:
     """Create a new folder as `create_new_folder` does, and its parents. Raises StudyError."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
-    with create_new_folder(folder) as new_folder:
-        yield new_folder
+    return create_new_folder(folder)

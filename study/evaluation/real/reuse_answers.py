@@ -5,7 +5,6 @@ whole run is refused before any work, with a list of the changes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +16,6 @@ from study.store.formats.real_answer_file import read_answer_and_provenance
 
 ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
 """File with the answer to a recording, and folder with the answers to injected faults."""
-
-
-@dataclass(frozen=True, slots=True)
-class _EarlierAnswer:
-    """An answer of an earlier run, and what has changed since it was given."""
-
-    folder: Path
-    answer: RealAnswer
-    changes: tuple[str, ...]
-    """Changes of input files and settings, as clauses; empty if the answer can be reused."""
 
 
 def locate_answer_folder(out: Path, real_recording: RealRecording) -> Path:
@@ -47,21 +36,21 @@ def find_reusable_answers(
     """Find earlier answers, by the folder of their results; nothing is written. seconds: as in
     `gather_answer_provenance`. Raises StudyError where an answer is damaged or was given for other inputs or settings,
     and CannotReadError where an input cannot be read."""
-    answered_recordings = [
-        recording for recording in recordings if (locate_answer_folder(out, recording) / ANSWER_NAME).is_file()
-    ]
-    earlier_answers = [
-        _read_earlier_answer(locate_answer_folder(out, recording), recording, seconds)
-        for recording in answered_recordings
-    ]
-    if outdated_answers := [answer for answer in earlier_answers if answer.changes]:
-        raise _make_inputs_changed_error(out, outdated_answers)
-    return {answer.folder: answer.answer for answer in earlier_answers}
+    answers, changes = dict[Path, RealAnswer](), dict[Path, tuple[str, ...]]()
+    for recording in recordings:
+        folder = locate_answer_folder(out, recording)
+        if (folder / ANSWER_NAME).is_file():
+            answers[folder], changes[folder] = _read_earlier_answer(folder, recording, seconds)
+    if any(changes.values()):
+        raise _make_inputs_changed_error(out, {folder: clauses for folder, clauses in changes.items() if clauses})
+    return answers
 
 
-def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
-    """Read the answer in a folder of results, and compare its inputs and settings with the present ones. Raises
-    StudyError where it is damaged."""
+def _read_earlier_answer(
+    folder: Path, real_recording: RealRecording, seconds: float | None
+) -> tuple[RealAnswer, tuple[str, ...]]:
+    """Read the answer in a folder of results, and the changes of its inputs and settings since, as clauses; empty if it
+    can be reused. Raises StudyError where it is damaged."""
     try:
         answer, stored_provenance = read_answer_and_provenance(folder / ANSWER_NAME)
     except StudyError as error:
@@ -73,13 +62,9 @@ def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: f
         ) from error
     current_provenance = gather_answer_provenance(real_recording, seconds)
     current_files = {(parent.file, parent.sha256) for parent in current_provenance.parents}
-    return _EarlierAnswer(
-        folder,
-        answer,
-        (
-            *_compare_files(_read_parents(stored_provenance), current_files),
-            *_compare_settings(stored_provenance, seconds),
-        ),
+    return answer, (
+        *_compare_files(_read_parents(stored_provenance), current_files),
+        *_compare_settings(stored_provenance, seconds),
     )
 
 
@@ -116,12 +101,10 @@ def _format_seconds(limit_s: float | None) -> str:
     return "left out" if limit_s is None else f"{limit_s:g}"
 
 
-def _make_inputs_changed_error(out: Path, outdated_answers: Sequence[_EarlierAnswer]) -> StudyError:
-    """Make the error that lists the changes of all outdated answers, and the folders to move away."""
-    change_texts = (
-        f"{answer.folder.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated_answers
-    )
-    paths_to_move = [str(answer.folder) for answer in outdated_answers]
+def _make_inputs_changed_error(out: Path, changes: Mapping[Path, tuple[str, ...]]) -> StudyError:
+    """Make the error that lists the changes of all outdated answers, by their folders, which are to be moved away."""
+    change_texts = (f"{path.relative_to(out) / ANSWER_NAME}: {', '.join(texts)}." for path, texts in changes.items())
+    paths_to_move = [str(folder) for folder in changes]
     if (injected_folder := out / INJECTED_NAME).exists():
         paths_to_move.append(f"{injected_folder}, which was computed from them")
     return StudyError(

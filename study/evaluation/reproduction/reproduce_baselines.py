@@ -47,13 +47,13 @@ def play_baselines(
     plan: ReproductionPlan,
     models: PlacedModels,
     frequency_response: FrequencyResponse,
-    on_share: Callable[[float], None],
+    on_progress: Callable[[float], None],
 ) -> tuple[PlayedResponse, ...]:
     """Play all baselines under each condition; at the edge and in the hand, they are followed by the equalizer that was
     designed for this condition.
 
-    frequency_response: of the device at the centre, including the spring. on_share: called with the fraction done, 0 to
-    1.
+    frequency_response: of the device at the centre, including the spring. on_progress: called with the fraction done, 0
+    to 1.
     """
     baseline_inverses = compute_baseline_inverses(
         models.centre, frequency_response, _list_band_frequencies_hz(plan, models.centre.sample_rate_hz)
@@ -70,9 +70,9 @@ def play_baselines(
             )
             response = replace(play_row(plan, row), multiply_adds=inverse.multiply_adds)
             responses.append(response)
-            on_share(len(responses) / row_count)
+            on_progress(len(responses) / row_count)
         responses += [play_row(plan, row) for row in _make_equalizer_rows(placement, models)]
-        on_share(len(responses) / row_count)
+        on_progress(len(responses) / row_count)
     return tuple(responses)
 
 

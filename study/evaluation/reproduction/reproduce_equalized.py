@@ -54,9 +54,9 @@ class EqualizedPlayback:
 
 
 def play_equalized(
-    plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]
+    plan: ReproductionPlan, models: PlacedModels, on_progress: Callable[[float], None]
 ) -> EqualizedPlayback:
-    """Play all rows on the simulated device. on_share: called after each row with the completed fraction, 0 to 1.
+    """Play all rows on the simulated device. on_progress: called after each row with the completed fraction, 0 to 1.
     Raises DeviceError and StudyError as `play_row`."""
     blended_models = blend_at(models.workspace, EDGE)
     modal_rows, modal_remarks = _interpolate_modes(models.workspace)
@@ -67,7 +67,7 @@ def play_equalized(
         # Without an equalizer the level is arbitrary: only the shape of the response is compared.
         is_unequalized = row.driver is drive_without_equalizer
         responses[key] = replace(response, response=normalise_gain(response.response)) if is_unequalized else response
-        on_share(number / len(rows))
+        on_progress(number / len(rows))
     return _split_rows(responses, (*blended_models.remarks, *modal_remarks, *_describe_clipping(responses)))
 
 

@@ -55,18 +55,18 @@ class ReproducedModel:
 
 
 def identify_or_load(
-    plan: ReproductionPlan, cached_recording: CachedRecording, on_share: Callable[[float], None]
+    plan: ReproductionPlan, cached_recording: CachedRecording, on_progress: Callable[[float], None]
 ) -> ReproducedModel:
     """Load the cached model, or identify it; a cached file that is unusable, of another recording, order or band,
-    or without its quality, is replaced. on_share: called with the fraction done, 0 to 1. Raises StudyError where the
+    or without its quality, is replaced. on_progress: called with the fraction done, 0 to 1. Raises StudyError where the
     identification fails."""
     path = plan.models / cached_recording.path.name
     model = _load_cached_model(path, plan, cached_recording.path)
     if model is None:
         path.unlink(missing_ok=True)
         identify_plan = IdentifyPlan((cached_recording.path,), path, plan.band_hz, plan.order, with_spring=True)
-        model = identify_model(identify_plan, on_share).model
-    on_share(1.0)
+        model = identify_model(identify_plan, on_progress).model
+    on_progress(1.0)
     return ReproducedModel(model, validate_on_test(model, (use_excitation_as_command(cached_recording.recording),)))
 
 

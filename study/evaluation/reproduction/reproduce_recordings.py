@@ -48,9 +48,9 @@ class CachedRecording:
 
 
 def record_or_load(
-    plan: ReproductionPlan, request: RecordingRequest, on_share: Callable[[float], None]
+    plan: ReproductionPlan, request: RecordingRequest, on_progress: Callable[[float], None]
 ) -> CachedRecording:
-    """Load the cached recording, or make it. on_share: called with the completed fraction, 0 to 1. Raises DeviceError,
+    """Load the cached recording, or make it. on_progress: called with the fraction done, 0 to 1. Raises DeviceError,
     and StudyError where the folder contains a recording of another run under this name."""
     path = plan.recordings / f"{request.name}.h5"
     protocol = read_recording_protocol(request.protocol).protocol
@@ -58,9 +58,9 @@ def record_or_load(
     if recording is None:
         recording_plan = RecordingPlan(protocol, request.device, request.place_m, plan.seed, path)
         total_s = recording_plan.total_s
-        record_device(recording_plan, lambda seconds: on_share(seconds / total_s))
+        record_device(recording_plan, lambda seconds: on_progress(seconds / total_s))
         recording = read_recording(path)
-    on_share(1.0)
+    on_progress(1.0)
     return CachedRecording(path, recording, _list_reduced_amplitudes(recording))
 
 

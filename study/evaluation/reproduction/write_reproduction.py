@@ -44,10 +44,10 @@ class WrittenReproduction:
 
 
 def write_reproduction_folder(
-    plan: ReproductionPlan, results: ReproductionResults, on_share: Callable[[float], None]
+    plan: ReproductionPlan, results: ReproductionResults, on_progress: Callable[[float], None]
 ) -> WrittenReproduction:
-    """Write figures, document and page, replacing those of an earlier run. on_share: called with the fraction done, 0
-    to 1; the intermediate fractions are approximate. Raises CannotWriteError."""
+    """Write figures, document and page, replacing those of an earlier run. on_progress: called with the fraction done,
+    0 to 1, approximate between the ends. Raises CannotWriteError."""
     direction_limit_hz = find_direction_limit(results.study)
     # Where the thresholds give no limit of direction, the published one separates the bands.
     band_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if direction_limit_hz is None else direction_limit_hz
@@ -56,9 +56,9 @@ def write_reproduction_folder(
     pictures = make_reproduction_pictures(
         results.study, results.ellipsoids, results.device, bands, band_limit_hz, results.equalized_playback.rows
     )
-    on_share(0.2)
+    on_progress(0.2)
     write_pictures(plan.figures, [picture for figure_pictures in pictures.values() for picture in figure_pictures])
-    on_share(0.8)
+    on_progress(0.8)
     provenance = gather_provenance(
         protocol_hash=results.protocol_hash, seeds={"reproduction": plan.seed}, parents=results.sources
     )
@@ -66,7 +66,7 @@ def write_reproduction_folder(
     write_reproduction(document_path, reproduction, provenance)
     page_html = render_reproduction_report(reproduction, pictures, _format_provenance(provenance), format_local_now())
     write_text(report_path, page_html, overwrite=True)
-    on_share(1.0)
+    on_progress(1.0)
     return WrittenReproduction(reproduction, summarise_figures(reproduction), document_path, report_path)
 
 

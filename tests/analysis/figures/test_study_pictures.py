@@ -93,6 +93,17 @@ def test_a_run_that_the_trial_limit_stopped_is_drawn_and_said(simulate_study, pr
     assert "45 Hz (stopped by the trial limit)" in titles
 
 
+def test_a_returning_participant_has_panels_that_name_the_session(protocol, simulate_study):
+    """Both sessions have a run at each frequency."""
+    first = recompute_runs(simulate_study(subjects=1), protocol.staircase)
+    runs = [*(replace(run, session=f"{run.session}_second") for run in first), *first]
+    titles = [axes.get_title(loc="left") for axes in draw_staircases(runs, protocol.staircase).axes]
+    alone = [axes.get_title(loc="left") for axes in draw_staircases(first, protocol.staircase).axes]
+    name = first[0].session
+    pairs = [(f"Session {name}\n{title}", f"Session {name}_second\n{title}") for title in alone if title]
+    assert [title for title in titles if title] == list(itertools.chain.from_iterable(pairs))
+
+
 def test_titles_of_staircases_do_not_run_into_each_other(simulate):
     """Those of two runs that the trial limit stopped did."""
     rule = replace(PUBLISHED, trial_limit=12)

@@ -17,6 +17,7 @@ from analysis.evaluation.blind_test.wording import format_figure
 from analysis.evaluation.laws.law_outcome import LawOutcome
 from equalizer.laws.law import Law
 from study.evaluation.bank.laws.prove_laws import LawBlindTest
+from study.evaluation.bank.sealed_bank import count_unanswered_cases, describe_unanswered_cases
 from study.evaluation.bank.write_proof import format_code_line, read_answering_commit, write_document, write_figures
 from study.store.disk.provenance import anonymise_arguments
 
@@ -88,8 +89,8 @@ def write_law_table(path: Path, result: LawBlindTest) -> None:
 
 
 def format_law_lines(result: LawBlindTest) -> Iterator[str]:
-    """Yield lines for the terminal: the number of misses, each miss, each figure, a remark where several versions of
-    the diagnosis answered, the seal of the labels, and the folder."""
+    """Yield lines for the terminal: the number of misses, each miss, each figure, remarks on cases without an answer
+    and on several versions of the diagnosis, the seal of the labels, and the folder."""
     yield f"{len(result.score.misses)} misses in {len(result.outcomes)} cases"
     for miss in result.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula
@@ -97,6 +98,7 @@ def format_law_lines(result: LawBlindTest) -> Iterator[str]:
     yield ""
     for figure in result.score.figures:
         yield f"{figure.name:52s} {format_figure(figure)}"
+    yield from describe_unanswered_cases(result.outcomes)
     if len(result.engines) > 1:
         yield (
             f"The answers come from {len(result.engines)} versions of the diagnosis: run the bank again, so that all "
@@ -108,7 +110,8 @@ def format_law_lines(result: LawBlindTest) -> Iterator[str]:
 
 def format_law_summary(result: LawBlindTest) -> str:
     """Format the result as JSON text."""
-    return json.dumps({"folder": str(result.folder.path), **_collect_shared_fields(result)}, indent=2)
+    summary = {"folder": str(result.folder.path), "unanswered": count_unanswered_cases(result.outcomes)}
+    return json.dumps(summary | _collect_shared_fields(result), indent=2)
 
 
 def _collect_shared_fields(result: LawBlindTest) -> dict[str, Any]:

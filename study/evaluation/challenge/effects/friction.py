@@ -37,16 +37,6 @@ def _replace_bristle(device: Device, axis: int, cells: dict[int, float]) -> Devi
     )
 
 
-def _draw_coulomb_friction(context: EffectContext) -> dict[str, float]:
-    """Draw the level (N)."""
-    return {"level": context.interpolate_log(0.003, 0.25)}
-
-
-def _build_coulomb_friction(device: Device, axis: int, values: Values) -> Device:
-    """Build in the same level for both directions."""
-    return _replace_bristle(device, axis, {LEVEL_POSITIVE: values["level"], LEVEL_NEGATIVE: values["level"]})
-
-
 def _draw_asymmetric_friction(context: EffectContext) -> dict[str, float]:
     """Draw the levels (N) of the two directions, which differ from their mean by 20 to 60 %."""
     mean_level_n, asymmetry = (
@@ -54,13 +44,6 @@ def _draw_asymmetric_friction(context: EffectContext) -> dict[str, float]:
         context.draw_sign() * context.random.uniform(0.2, 0.6),
     )
     return {"level_positive": mean_level_n * (1 + asymmetry), "level_negative": mean_level_n * (1 - asymmetry)}
-
-
-def _build_asymmetric_friction(device: Device, axis: int, values: Values) -> Device:
-    """Build in a level for each direction."""
-    return _replace_bristle(
-        device, axis, {LEVEL_POSITIVE: values["level_positive"], LEVEL_NEGATIVE: values["level_negative"]}
-    )
 
 
 def _draw_stribeck_friction(context: EffectContext) -> dict[str, float]:
@@ -128,11 +111,22 @@ def _build_position_dependent(device: Device, axis: int, values: Values) -> Devi
 
 
 EFFECTS = (
-    ConcealedEffect("coulomb_friction", "mechanism", True, _draw_coulomb_friction, _build_coulomb_friction),
-    ConcealedEffect("asymmetric_friction", "mechanism", True, _draw_asymmetric_friction, _build_asymmetric_friction),
+    ConcealedEffect(
+        "coulomb_friction", "mechanism", True,
+        lambda context: {"level": context.interpolate_log(0.003, 0.25)},
+        lambda device, axis, values: _replace_bristle(
+            device, axis, {LEVEL_POSITIVE: values["level"], LEVEL_NEGATIVE: values["level"]}
+        ),
+    ),
+    ConcealedEffect(
+        "asymmetric_friction", "mechanism", True, _draw_asymmetric_friction,
+        lambda device, axis, values: _replace_bristle(
+            device, axis, {LEVEL_POSITIVE: values["level_positive"], LEVEL_NEGATIVE: values["level_negative"]}
+        ),
+    ),
     ConcealedEffect("stribeck_friction", "mechanism", True, _draw_stribeck_friction, _build_stribeck_friction),
     ConcealedEffect("presliding_hysteresis", "mechanism", True, _draw_presliding, _build_presliding),
     ConcealedEffect(
         "position_dependent_friction", "mechanism", True, _draw_position_dependent, _build_position_dependent
     ),
-)
+)  # fmt: skip

@@ -45,17 +45,6 @@ def _build_hand(device: Device, axis: int, values: Values) -> Device:
     return replace(device, bench=bench)
 
 
-def _draw_grip(context: EffectContext) -> dict[str, float]:
-    """Draw rate 0.03 to 0.5 Hz, depth 0.02 to 0.8, phase (rad), and stiffness_share: 0 or 1, whether the stiffness
-    varies too."""
-    return {
-        "rate_hz": context.draw_log_uniform(0.03, 0.5),
-        "depth": context.interpolate_log(0.02, 0.8),
-        "phase": context.random.uniform(0, 2 * np.pi),
-        "stiffness_share": float(context.random.integers(2)),
-    }
-
-
 def _build_grip(device: Device, axis: int, values: Values) -> Device:
     """Modulate damping and, if drawn, stiffness of the device on all axes; `axis` is not used."""
     modulation = np.zeros((3, 5))
@@ -67,7 +56,16 @@ def _build_grip(device: Device, axis: int, values: Values) -> Device:
 
 EFFECTS = (
     ConcealedEffect("hand_impedance", "hand", False, _draw_hand, _build_hand),
-    ConcealedEffect("time_varying_grip", "hand", False, _draw_grip, _build_grip),
-)
+    ConcealedEffect(
+        "time_varying_grip", "hand", False,
+        lambda context: {
+            "rate_hz": context.draw_log_uniform(0.03, 0.5),
+            "depth": context.interpolate_log(0.02, 0.8),
+            "phase": context.random.uniform(0, 2 * np.pi),
+            "stiffness_share": float(context.random.integers(2)),
+        },
+        _build_grip,
+    ),
+)  # fmt: skip
 """The effects of the hand: name, place, whether it acts on one axis (else on all), functions that draw its parameters
 and build it in."""

@@ -30,36 +30,6 @@ def _add_to_handle(device: Device, axis: int, mass_kg: float, damping_n_s_per_m:
     return replace(device, bench=replace(device.bench, mass=mass, damping=damping_matrix))
 
 
-def _draw_viscous_damping(context: EffectContext) -> dict[str, float]:
-    """Draw the damping (N s/m)."""
-    return {"damping": context.interpolate_log(0.2, 6.0)}
-
-
-def _build_viscous_damping(device: Device, axis: int, values: Values) -> Device:
-    """Add the damping to one axis."""
-    return _add_to_handle(device, axis, 0.0, values["damping"])
-
-
-def _draw_added_mass(context: EffectContext) -> dict[str, float]:
-    """Draw the mass (kg)."""
-    return {"mass": context.interpolate_log(0.003, 0.08)}
-
-
-def _build_added_mass(device: Device, axis: int, values: Values) -> Device:
-    """Add the mass to one axis."""
-    return _add_to_handle(device, axis, values["mass"], 0.0)
-
-
-def _draw_quadratic_damping(context: EffectContext) -> dict[str, float]:
-    """Draw the coefficient c (N s²/m²)."""
-    return {"coefficient": context.interpolate_log(1.0, 60.0)}
-
-
-def _build_quadratic_damping(device: Device, axis: int, values: Values) -> Device:
-    """Set the quadratic damping of one axis."""
-    return replace_handle_forces(device, axis, {QUADRATIC_DAMPING: values["coefficient"]})
-
-
 def _draw_pose_dependent_inertia(context: EffectContext) -> dict[str, float]:
     """Draw per_m (1/m), by which the mass changes by 1 to 50 % over the largest distance from the centre, and
     whole_handle (1: whole handle, 0: this axis only)."""
@@ -126,12 +96,24 @@ def _build_backlash(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    ConcealedEffect("viscous_damping", "mechanism", True, _draw_viscous_damping, _build_viscous_damping),
-    ConcealedEffect("added_mass", "mechanism", True, _draw_added_mass, _build_added_mass),
-    ConcealedEffect("quadratic_damping", "mechanism", True, _draw_quadratic_damping, _build_quadratic_damping),
+    ConcealedEffect(
+        "viscous_damping", "mechanism", True,
+        lambda context: {"damping": context.interpolate_log(0.2, 6.0)},
+        lambda device, axis, values: _add_to_handle(device, axis, 0.0, values["damping"]),
+    ),
+    ConcealedEffect(
+        "added_mass", "mechanism", True,
+        lambda context: {"mass": context.interpolate_log(0.003, 0.08)},
+        lambda device, axis, values: _add_to_handle(device, axis, values["mass"], 0.0),
+    ),
+    ConcealedEffect(
+        "quadratic_damping", "mechanism", True,
+        lambda context: {"coefficient": context.interpolate_log(1.0, 60.0)},
+        lambda device, axis, values: replace_handle_forces(device, axis, {QUADRATIC_DAMPING: values["coefficient"]}),
+    ),
     ConcealedEffect(
         "pose_dependent_inertia", "mechanism", True, _draw_pose_dependent_inertia, _build_pose_dependent_inertia
     ),
     ConcealedEffect("extra_mode", "mechanism", True, _draw_extra_mode, _build_extra_mode),
     ConcealedEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
-)
+)  # fmt: skip

@@ -27,16 +27,6 @@ from study.evaluation.challenge.handle_force_kernel import (
 )
 
 
-def _draw_hardening_stiffness(context: EffectContext) -> dict[str, float]:
-    """Draw k3 such that the force at the end of the travel is 0.005 to 0.4 N."""
-    return {"k3": context.interpolate_log(0.005, 0.4) / context.travel_m[context.axis] ** 3}
-
-
-def _build_hardening_stiffness(device: Device, axis: int, values: Values) -> Device:
-    """Set the cubic stiffness of one axis."""
-    return replace_handle_forces(device, axis, {CUBIC_STIFFNESS: values["k3"]})
-
-
 def _draw_asymmetric_stiffness(context: EffectContext) -> dict[str, float]:
     """Draw k2, of either sign, such that |k2 x| at the end of the travel is 0.5 to 30 % of the ground's stiffness."""
     # Above 50 % the tangent stiffness would be negative there.
@@ -48,30 +38,6 @@ def _draw_asymmetric_stiffness(context: EffectContext) -> dict[str, float]:
             * ground_stiffness_n_per_m
             / context.travel_m[context.axis]
         )
-    }
-
-
-def _build_asymmetric_stiffness(device: Device, axis: int, values: Values) -> Device:
-    """Set the square stiffness of one axis."""
-    return replace_handle_forces(device, axis, {SQUARE_STIFFNESS: values["k2"]})
-
-
-def _draw_constant_force(context: EffectContext) -> dict[str, float]:
-    """Draw a force of 0.001 to 0.3 N, of either sign."""
-    return {"force": context.draw_sign() * context.interpolate_log(0.001, 0.3)}
-
-
-def _build_constant_force(device: Device, axis: int, values: Values) -> Device:
-    """Set the constant force on one axis."""
-    return replace_handle_forces(device, axis, {CONSTANT_FORCE: values["force"]})
-
-
-def _draw_cogging(context: EffectContext) -> dict[str, float]:
-    """Draw amplitude (N), pitch (0.4 to 4 mm) and phase (rad)."""
-    return {
-        "amplitude": context.interpolate_log(0.004, 0.15),
-        "pitch": context.draw_log_uniform(4e-4, 4e-3),
-        "phase": context.random.uniform(0, 2 * np.pi),
     }
 
 
@@ -101,10 +67,29 @@ def _build_end_stop(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    ConcealedEffect("hardening_stiffness", "mechanism", True, _draw_hardening_stiffness, _build_hardening_stiffness),
-    ConcealedEffect("asymmetric_stiffness", "mechanism", True, _draw_asymmetric_stiffness, _build_asymmetric_stiffness),
-    ConcealedEffect("constant_force", "mechanism", True, _draw_constant_force, _build_constant_force),
-    ConcealedEffect("cogging", "mechanism", True, _draw_cogging, _build_cogging),
+    ConcealedEffect(
+        "hardening_stiffness", "mechanism", True,
+        lambda context: {"k3": context.interpolate_log(0.005, 0.4) / context.travel_m[context.axis] ** 3},
+        lambda device, axis, values: replace_handle_forces(device, axis, {CUBIC_STIFFNESS: values["k3"]}),
+    ),
+    ConcealedEffect(
+        "asymmetric_stiffness", "mechanism", True, _draw_asymmetric_stiffness,
+        lambda device, axis, values: replace_handle_forces(device, axis, {SQUARE_STIFFNESS: values["k2"]}),
+    ),
+    ConcealedEffect(
+        "constant_force", "mechanism", True,
+        lambda context: {"force": context.draw_sign() * context.interpolate_log(0.001, 0.3)},
+        lambda device, axis, values: replace_handle_forces(device, axis, {CONSTANT_FORCE: values["force"]}),
+    ),
+    ConcealedEffect(
+        "cogging", "mechanism", True,
+        lambda context: {
+            "amplitude": context.interpolate_log(0.004, 0.15),
+            "pitch": context.draw_log_uniform(4e-4, 4e-3),
+            "phase": context.random.uniform(0, 2 * np.pi),
+        },
+        _build_cogging,
+    ),
     ConcealedEffect("end_stop", "mechanism", True, _draw_end_stop, _build_end_stop),
-)
+)  # fmt: skip
 """Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

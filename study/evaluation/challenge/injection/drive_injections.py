@@ -51,10 +51,10 @@ def compute_force_level(motion: AxisMotion, strength: float) -> float:
     return compute_centred_rms(motion.command) * float(0.02 * 50.0**strength)
 
 
-def _delay_samples(samples: FloatArray, delay_samples: float) -> FloatArray:
-    """Delay samples (n,) by delay_samples (negative: advance), interpolated linearly; the end values are repeated."""
+def delay_samples(samples: FloatArray, sample_count: float) -> FloatArray:
+    """Delay samples (n,) by sample_count (negative: advance), interpolated linearly; the end values are repeated."""
     sample_numbers = np.arange(len(samples), dtype=np.float64)
-    return np.asarray(np.interp(sample_numbers - delay_samples, sample_numbers, samples))
+    return np.asarray(np.interp(sample_numbers - sample_count, sample_numbers, samples))
 
 
 def _invert_cubic_gain(motion: AxisMotion, values: Values) -> FloatArray:
@@ -103,11 +103,6 @@ def _invert_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
     return command
 
 
-def _draw_gain(motion: AxisMotion, strength: float, generator: np.random.Generator) -> dict[str, float]:
-    """Draw a gain above 1 by 2 % to 80 %, or below 1 by half as much, logarithmic in the strength."""
-    return {"gain": float(1 + generator.choice((-0.5, 1.0)) * 0.02 * 40.0**strength)}
-
-
 def _compute_median_rad_per_s(samples: FloatArray, rate_hz: float) -> float:
     """Compute the angular frequency (rad/s) below which half of the power lies, the mean removed; at least that of the
     first line of the spectrum."""
@@ -117,7 +112,12 @@ def _compute_median_rad_per_s(samples: FloatArray, rate_hz: float) -> float:
 
 
 DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
-    ForceInjection("force_gain", _draw_gain, lambda motion, values: motion.command / values["gain"], actuator=True),
+    ForceInjection(
+        "force_gain",
+        lambda motion, strength, generator: {"gain": float(1 + generator.choice((-0.5, 1.0)) * 0.02 * 40.0**strength)},
+        lambda motion, values: motion.command / values["gain"],
+        actuator=True,
+    ),
     ForceInjection(
         "force_offset",
         lambda motion, strength, generator: {
@@ -131,7 +131,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
         lambda motion, strength, generator: {
             "delay": max(0.3 * 0.02 * 50.0**strength / _compute_median_rad_per_s(motion.command, motion.rate_hz), 1e-9)
         },
-        lambda motion, values: _delay_samples(motion.command, -values["delay"] * motion.rate_hz),
+        lambda motion, values: delay_samples(motion.command, -values["delay"] * motion.rate_hz),
         actuator=True,
         memory=True,
     ),
@@ -173,7 +173,8 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
         actuator=True,
     ),
 )
-"""Faults of the drive: name, draw of the parameters, and the command that would have been needed. Delay and time
-constant are 0.006 to 0.3 of the period of the median frequency over 2 pi; the quantization step is
-`compute_force_level` at strengths from 0.3 to 1, the width of the dead band half of it at 0 to 1; the cubic term is 2
-to 60 % of the largest command, the gain drift 5 to 100 % (half as much where it is negative)."""
+"""Faults of the drive: name, draw of the parameters, and the command that would have been needed. The gain differs from
+1 by 2 to 80 % upwards, by half as much downwards. Delay and time constant are 0.006 to 0.3 of the period of the median
+frequency over 2 pi; the quantization step is `compute_force_level` at strengths from 0.3 to 1, the width of the dead
+band half of it at 0 to 1; the cubic term is 2 to 60 % of the largest command, the gain drift 5 to 100 % (half as much
+where it is negative)."""

@@ -18,21 +18,13 @@ from study.evaluation.challenge.injection.axis_motion import compute_axis_motion
 from study.evaluation.challenge.injection.drive_injections import ForceInjection
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
 from study.evaluation.challenge.injection.reading_faults import (
-    add_cubic_term,
-    add_drift,
     add_hum,
-    add_noise,
-    add_offset,
-    add_square_term,
     apply_lag,
     apply_play,
-    clip_readings,
     delay_readings,
     lose_samples,
     mix_channels,
-    quantize_readings,
     rotate_readings,
-    scale_readings,
     shift_clock,
 )
 
@@ -127,7 +119,7 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_clipping",
         lambda statistics, s, r: {"limit": statistics.peak * _interpolate_log(0.95, 0.25, s)},
-        clip_readings,
+        lambda y, rate_hz, values, r: np.clip(y, -values["limit"], values["limit"]),
     ),
     Injection(
         "mains_hum",
@@ -141,17 +133,17 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_drift",
         lambda statistics, s, r: {"total": _draw_sign(r) * statistics.rms * _interpolate_log(0.05, 3.0, s)},
-        add_drift,
+        lambda y, rate_hz, values, r: y + values["total"] * np.linspace(0.0, 1.0, len(y))[:, None],
     ),
     Injection(
         "sensor_offset",
         lambda statistics, s, r: {"offset": _draw_sign(r) * statistics.rms * _interpolate_log(0.02, 1.5, s)},
-        add_offset,
+        lambda y, rate_hz, values, r: y + values["offset"],
     ),
     Injection(
         "quantization",
         lambda statistics, s, r: {"step": statistics.rms * _interpolate_log(0.05, 1.5, s)},
-        quantize_readings,
+        lambda y, rate_hz, values, r: values["step"] * np.round(y / values["step"]),
     ),
     Injection("lost_samples", lambda statistics, s, r: {"fraction": _interpolate_log(0.003, 0.3, s)}, lose_samples),
     Injection(
@@ -165,7 +157,7 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_gain",
         lambda statistics, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _interpolate_log(0.02, 0.8, s)},
-        scale_readings,
+        lambda y, rate_hz, values, r: values["gain"] * y,
     ),
     Injection(
         "logger_offset",
@@ -176,15 +168,17 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_nonlinearity",
         lambda statistics, s, r: {"cubic": _draw_sign(r) * _interpolate_log(0.02, 0.3, s) / statistics.peak**2},
-        add_cubic_term,
+        lambda y, rate_hz, values, r: y + values["cubic"] * y**3,
     ),
     Injection(
         "sensor_asymmetry",
         lambda statistics, s, r: {"square": _draw_sign(r) * _interpolate_log(0.02, 0.4, s) / statistics.peak},
-        add_square_term,
+        lambda y, rate_hz, values, r: y + values["square"] * y**2,
     ),
     Injection(
-        "sensor_noise", lambda statistics, s, r: {"rms": statistics.rms * _interpolate_log(0.003, 0.5, s)}, add_noise
+        "sensor_noise",
+        lambda statistics, s, r: {"rms": statistics.rms * _interpolate_log(0.003, 0.5, s)},
+        lambda y, rate_hz, values, r: y + values["rms"] * r.normal(size=y.shape),
     ),
     Injection(
         "sensor_play",
@@ -200,8 +194,8 @@ INJECTIONS: tuple[Injection, ...] = (
     ),
     Injection("sensor_misalignment", _draw_misalignment, rotate_readings, min_channels=3),
 )
-"""Faults of sensor, clock and mains: name, draw of the parameters, and change of the response. In the draws, s is the
-strength and r the random generator; the ranges were chosen by hand."""
+"""Faults of sensor, clock and mains: name, draw of the parameters, and change of the response. In the functions, s is
+the strength, r the random generator and y the readings; the ranges were chosen by hand."""
 
 
 def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> FaultyRecording:

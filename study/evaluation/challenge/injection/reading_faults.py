@@ -8,18 +8,16 @@ that are interpolated with it; `lose_samples` may repeat or replace it. Argument
 ignored.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
+from numpy.random import Generator
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.injection.drive_injections import Values, delay_samples
 
 
-def apply_lag(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def apply_lag(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Apply a first-order low-pass with the corner frequency `bandwidth` (Hz), at rest at the first reading."""
     smoothing_factor = 1.0 - np.exp(-2 * np.pi * parameters["bandwidth"] / rate_hz)
     filtered, _ = lfilter(
@@ -28,45 +26,13 @@ def apply_lag(
     return np.asarray(filtered)
 
 
-def clip_readings(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Clip the readings at +-limit."""
-    return np.asarray(np.clip(readings, -parameters["limit"], parameters["limit"]))
-
-
-def add_hum(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def add_hum(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Add mains hum, the same in all channels: `amplitude`, `frequency` (Hz), phase `turn` (turns)."""
     turns = parameters["frequency"] * np.arange(len(readings)) / rate_hz + parameters["turn"]
     return np.asarray(readings + parameters["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
 
 
-def add_drift(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Add a drift, the same in all channels: linear from 0 at the start to `total` at the end."""
-    return readings + parameters["total"] * np.linspace(0.0, 1.0, len(readings))[:, None]
-
-
-def add_offset(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Add the constant `offset`, the same in all channels."""
-    return readings + parameters["offset"]
-
-
-def quantize_readings(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Quantize the readings to the nearest multiple of `step`."""
-    return np.asarray(parameters["step"] * np.round(readings / parameters["step"]))
-
-
-def lose_samples(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def lose_samples(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Lose each sample but the first with probability `fraction`: all channels repeat the last sample that was not
     lost."""
     is_lost = random.random(len(readings)) < parameters["fraction"]
@@ -75,9 +41,7 @@ def lose_samples(
     return np.asarray(readings[source_indices])
 
 
-def shift_clock(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def shift_clock(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Apply a clock error of `ppm` (parts per million): reading k is taken at the time k (1 + 1e-6 ppm) / rate_hz, by
     linear interpolation; before the first reading and after the last, their values are repeated."""
     indices = np.arange(len(readings), dtype=np.float64)
@@ -85,56 +49,19 @@ def shift_clock(
     return np.column_stack([np.interp(read_indices, indices, channel) for channel in readings.T])
 
 
-def rotate_readings(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def rotate_readings(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Rotate exactly three channels, as a misaligned sensor, by `degrees` about the unit vector (about_x, about_y,
     about_z)."""
     unit_vector = np.array([parameters["about_x"], parameters["about_y"], parameters["about_z"]])
     return np.asarray(Rotation.from_rotvec(np.radians(parameters["degrees"]) * unit_vector).apply(np.array(readings)))
 
 
-def scale_readings(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Multiply all channels by `gain`."""
-    return parameters["gain"] * readings
-
-
-def delay_readings(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def delay_readings(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Delay the readings by `offset` (s; negative: advance), interpolated linearly; the end values are repeated."""
-    indices = np.arange(len(readings), dtype=np.float64)
-    return np.column_stack(
-        [np.interp(indices - parameters["offset"] * rate_hz, indices, channel) for channel in readings.T]
-    )
+    return np.column_stack([delay_samples(channel, parameters["offset"] * rate_hz) for channel in readings.T])
 
 
-def add_cubic_term(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Apply the cubic nonlinearity a + cubic a^3 to the readings a."""
-    return np.asarray(readings + parameters["cubic"] * readings**3)
-
-
-def add_square_term(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Apply the quadratic nonlinearity a + square a^2 to the readings a."""
-    return np.asarray(readings + parameters["square"] * readings**2)
-
-
-def add_noise(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    """Add white normal noise with the standard deviation `rms`, independent in each channel."""
-    return np.asarray(readings + parameters["rms"] * random.normal(size=readings.shape))
-
-
-def apply_play(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def apply_play(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Apply a hysteresis (play operator) with the total width `gap`: the output follows the reading at a distance of at
     most half the gap, beginning at the first reading. A missing reading (NaN) stays missing."""
     output, previous, half_gap = np.empty_like(readings), readings[0], 0.5 * parameters["gap"]
@@ -149,9 +76,7 @@ def apply_play(
     return output
 
 
-def mix_channels(
-    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def mix_channels(readings: FloatArray, rate_hz: float, parameters: Values, random: Generator) -> FloatArray:
     """Apply a cross-axis sensitivity: add to the first channel the second, scaled to the standard deviation of the
     first, times `from_next`. At least two channels; the second must vary."""
     output = readings.copy()

@@ -40,7 +40,8 @@ class LawKind:
     along another axis, vx, vy, rx, ry: velocity and reading by axis, u: command, r: reading, t: time; lag(x, a): x
     after a first-order low pass with the time constant a (s)."""
     draw: Callable[[Random, PeakValues], tuple[float, float]]
-    """Draws the parameters a and b; one that the formula does not contain has no effect."""
+    """Draws the parameters a and b, in SI units (phases in rad, frequencies in Hz); one that the formula does not
+    contain has no effect."""
     variables: tuple[str, ...]
     """Sets of variables that are all accepted, each separated by spaces: x, y positions, vx, vy velocities, ax,
     ay readings, fx command, t time; x is the law's own axis."""
@@ -69,45 +70,9 @@ def _draw_zeros(random: Random, peaks: PeakValues) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def _draw_speed_exponent(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, the exponent of the speed: 1.5, 3 or any number from 1.3 to 3.2; b = 0."""
-    return _draw_simple_or_uniform(random, (1.5, 3.0), 1.3, 3.2), 0.0
-
-
-def _draw_position_exponent(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, the exponent of the position: 1.5, 2, 5 or any number from 1.4 to 4; b = 0."""
-    return _draw_simple_or_uniform(random, (1.5, 2.0, 5.0), 1.4, 4.0), 0.0
-
-
 def _draw_exponent(random: Random, peaks: PeakValues) -> tuple[float, float]:
     """Draw a, an exponent: 1 or 2; b = 0."""
     return float(random.choice((1.0, 2.0))), 0.0
-
-
-def _draw_spatial_period(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, the spatial period (m), 0.3 to 0.9 times the largest travel, and b, the phase (rad)."""
-    return peaks.travel_m * random.uniform(0.3, 0.9), random.uniform(-np.pi, np.pi)
-
-
-def _draw_pumping(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, the frequency (Hz), 0.5 to 6, and b, the phase (rad)."""
-    return random.uniform(0.5, 6.0), random.uniform(-np.pi, np.pi)
-
-
-def _draw_attractor(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, the distance of the attracting body (m), 1.4 to 2.2 times the largest travel, and b, the exponent: 1, 2
-    or 3."""
-    return peaks.travel_m * random.uniform(1.4, 2.2), float(random.choice((1.0, 2.0, 3.0)))
-
-
-def _draw_short_lag(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, a time constant (s), 8 ms to 0.4 s, log-uniform; b = 0."""
-    return float(np.exp(random.uniform(np.log(0.008), np.log(0.4)))), 0.0
-
-
-def _draw_long_lag(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, a time constant (s), 0.4 s to 4 s; b = 0."""
-    return random.uniform(0.4, 4.0), 0.0
 
 
 def _draw_speed_scale(random: Random, peaks: PeakValues) -> tuple[float, float]:
@@ -121,16 +86,6 @@ def _draw_position_scale(random: Random, peaks: PeakValues) -> tuple[float, floa
     return peaks.travel_m * random.uniform(0.1, 0.5), 1.5
 
 
-def _draw_force_limit(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, the force (N) at which an amplifier saturates, 0.3 to 0.8 times the peak; b = 0."""
-    return peaks.force_n * random.uniform(0.3, 0.8), 0.0
-
-
-def _draw_reading_limit(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """Draw a, the acceleration (m/s²) at which a sensor saturates, 0.3 to 0.8 times the peak; b = 0."""
-    return peaks.reading_mps2 * random.uniform(0.3, 0.8), 0.0
-
-
 def _make_force_law(  # noqa: PLR0913 - the columns of the table below
     name: str, formula: str, code: int, draw: Callable[[Random, PeakValues], tuple[float, float]],
     *variables: str, axes: int = 1, memory: bool = False, mutual: bool = False,
@@ -140,15 +95,24 @@ def _make_force_law(  # noqa: PLR0913 - the columns of the table below
 
 
 LAW_KINDS: tuple[LawKind, ...] = (
-    _make_force_law("drag of a power", "-k |v|^a sgn v", kernel.SPEED_POWER, _draw_speed_exponent, "vx"),
-    _make_force_law("spring of a power", "-k |x|^a sgn x", kernel.POSITION_POWER, _draw_position_exponent, "x"),
+    _make_force_law("drag of a power", "-k |v|^a sgn v", kernel.SPEED_POWER,
+            lambda random, peaks: (_draw_simple_or_uniform(random, (1.5, 3.0), 1.3, 3.2), 0.0), "vx"),
+    _make_force_law("spring of a power", "-k |x|^a sgn x", kernel.POSITION_POWER,
+            lambda random, peaks: (_draw_simple_or_uniform(random, (1.5, 2.0, 5.0), 1.4, 4.0), 0.0), "x"),
     _make_force_law("drag that grows with the place", "-k |x|^a v", kernel.POSITION_DRAG, _draw_exponent, "x vx"),
     _make_force_law("spring that grows with the speed", "-s k x |v|^a", kernel.SPEED_SPRING, _draw_exponent, "x vx"),
-    _make_force_law("gain that ripples", "k u sin(2 pi x / a + b)", kernel.GAIN_RIPPLE, _draw_spatial_period, "fx x"),
-    _make_force_law("pumped stiffness", "-k x sin(2 pi a t + b)", kernel.PUMPED_STIFFNESS, _draw_pumping, "t x"),
-    _make_force_law("attraction", "s k (1 / (a - s x)^b - 1 / a^b)", kernel.ATTRACTION, _draw_attractor, "x"),
-    _make_force_law("relaxation", "-k (x - lag(x, a))", kernel.RELAXATION, _draw_short_lag, "x", "vx", memory=True),
-    _make_force_law("heating gain", "-k u lag(u^2, a)", kernel.HEATING, _draw_long_lag, "fx", memory=True),
+    _make_force_law("gain that ripples", "k u sin(2 pi x / a + b)", kernel.GAIN_RIPPLE,
+            lambda random, peaks: (peaks.travel_m * random.uniform(0.3, 0.9), random.uniform(-np.pi, np.pi)), "fx x"),
+    _make_force_law("pumped stiffness", "-k x sin(2 pi a t + b)", kernel.PUMPED_STIFFNESS,
+            lambda random, peaks: (random.uniform(0.5, 6.0), random.uniform(-np.pi, np.pi)), "t x"),
+    _make_force_law("attraction", "s k (1 / (a - s x)^b - 1 / a^b)", kernel.ATTRACTION,
+            lambda random, peaks: (peaks.travel_m * random.uniform(1.4, 2.2), float(random.choice((1.0, 2.0, 3.0)))),
+            "x"),
+    _make_force_law("relaxation", "-k (x - lag(x, a))", kernel.RELAXATION,
+            lambda random, peaks: (float(np.exp(random.uniform(np.log(0.008), np.log(0.4)))), 0.0),
+            "x", "vx", memory=True),
+    _make_force_law("heating gain", "-k u lag(u^2, a)", kernel.HEATING,
+            lambda random, peaks: (random.uniform(0.4, 4.0), 0.0), "fx", memory=True),
     _make_force_law("soft drag", "-k tanh(v / a)", kernel.SOFT_DRAG, _draw_speed_scale, "vx"),
     _make_force_law("soft spring", "-k atan(x / a)", kernel.SOFT_SPRING, _draw_position_scale, "x"),
     _make_force_law("fading drag", "-k v / (1 + (v / a)^2)", kernel.FADING_DRAG, _draw_speed_scale, "vx"),
@@ -161,15 +125,17 @@ LAW_KINDS: tuple[LawKind, ...] = (
                mutual=True),
     _make_force_law("drag along the path", "-k |v| v of both axes", kernel.PATH_DRAG, _draw_zeros, "vx vy", axes=2,
                mutual=True),
-    LawKind("soft amplifier", "a tanh(u / a)", _draw_force_limit, ("fx",), acts_on=("command", "force"),
-            change=lambda u, cross, a, b: a * np.tanh(u / a) - u),
+    LawKind("soft amplifier", "a tanh(u / a)",
+            lambda random, peaks: (peaks.force_n * random.uniform(0.3, 0.8), 0.0), ("fx",),
+            acts_on=("command", "force"), change=lambda u, cross, a, b: a * np.tanh(u / a) - u),
     LawKind("amplifier of two gains", "u + s k |u|", _draw_zeros, ("fx",), acts_on=("command", "force"),
             change=lambda u, cross, a, b: np.abs(u)),
     LawKind("bent amplifier", "u + s k u |u|", _draw_zeros, ("fx",), acts_on=("command", "force"),
             change=lambda u, cross, a, b: u * np.abs(u)),
     LawKind("crooked sensor", "r + s k r^2", _draw_zeros, ("ax",), acts_on=("response",),
             change=lambda r, cross, a, b: r * r),
-    LawKind("soft sensor", "a atan(r / a)", _draw_reading_limit, ("ax",), acts_on=("response",),
+    LawKind("soft sensor", "a atan(r / a)",
+            lambda random, peaks: (peaks.reading_mps2 * random.uniform(0.3, 0.8), 0.0), ("ax",), acts_on=("response",),
             change=lambda r, cross, a, b: a * np.arctan(r / a) - r),
     LawKind("sensor of two axes", "rx + s k rx ry", _draw_zeros, ("ax ay",), acts_on=("response",), axes=2,
             change=lambda r, cross, a, b: r * cross),

@@ -144,6 +144,24 @@ def test_a_case_whose_process_died_keeps_all_its_recordings(tmp_path, monkeypatc
     assert {path.name for path in place.glob("*.h5")} == {RECORDING_FILE, FURTHER_RECORDING_FILE.format(2)}
 
 
+def test_what_an_earlier_answer_proposed_is_not_counted(tmp_path, monkeypatch):
+    """The start is diagnosed again, by another version, and proposes something else."""
+    monkeypatch.setattr("study.evaluation.bank.ask_engine.diagnose_cases", lambda *_: None)
+    folder, outcome, menu = started(tmp_path / "bank", True)
+    with pytest.raises(StudyError, match="answer.json"):  # without an answer
+        follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
+    path = next(folder.open.glob(f"*/{ANSWER_FILE}"))
+    said = json.loads(path.read_text())
+    path.write_text(json.dumps(said | {"proposal": said["proposal"] | {"best": [menu[1].words]}}))
+    with pytest.raises(StudyError, match="belongs to an earlier answer") as refused:
+        follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
+    assert f"Delete the folder {folder.path / FOLLOW_UP_FOLDER}" in refused.value.do_now
+    sealed = ProofFolder(folder.path / FOLLOW_UP_FOLDER).get_label_file(NUMBER)
+    sealed.write_text(sealed.read_text().replace('"proposal"', '"proposal" '))
+    with pytest.raises(StudyError, match="A seal is broken"):  # and is not hidden by the other refusal
+        follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
+
+
 def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):
     folder, _, _ = started(tmp_path / "bank", True)
     place = folder.open / json.loads(folder.get_label_file(NUMBER).read_text())["name"]

@@ -185,15 +185,14 @@ def test_a_lock_that_cannot_be_written_is_told_with_its_reason(tmp_path):
 
 
 def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
-    folder = copied
-    path = next(folder.sealed.glob("*.json"))
+    path = next(copied.sealed.glob("*.json"))
     path.write_text(path.read_text().replace('"kind"', '"kind" '))
     with pytest.raises(StudyError, match="A seal is broken"):
-        reveal_bank(folder, 100, make_outcome)
-    sealed = folder.seals_file.read_text()
+        reveal_bank(copied, 100, make_outcome)
+    sealed = copied.seals_file.read_text()
     with pytest.raises(StudyError, match="A seal is broken"):
-        prove(folder.path, PLAN, BankOptions(), lambda *_: None)
-    assert folder.seals_file.read_text() == sealed
+        prove(copied.path, PLAN, BankOptions(), lambda *_: None)
+    assert copied.seals_file.read_text() == sealed
 
 
 def test_a_label_that_was_removed_afterwards_breaks_its_seal(tmp_path):
@@ -221,8 +220,11 @@ def test_a_sealed_case_that_cannot_be_drawn_here_is_scored_and_not_said_to_be_le
     """As of MuJoCo, with which the bank was sealed on another machine."""
     for module in ("prove", "seal_cases"):
         monkeypatch.setattr(f"study.evaluation.bank.{module}.list_drawable_cases", lambda plan: ())
+    no_longer_counted = copied.path / "next" / "open" / "a1b2"
+    no_longer_counted.mkdir(parents=True)
+    (no_longer_counted / ANSWER_FILE).write_text('{"engine": "old"}')
     done = prove(copied.path, PLAN, BankOptions(), lambda *_: None)
-    assert (len(done.outcomes), done.omitted_cases, len(done.engines)) == (1, 0, 1)
+    assert (len(done.outcomes), done.omitted_cases, len(done.engines), done.other_engines) == (1, 0, 1, ())
 
 
 def test_seals_that_are_none_break_the_proof(copied):
@@ -290,10 +292,8 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(UserInterruptError, match="Interrupted"):
-        prove(tmp_path / "bank", BankPlan(SEED, 1, brief=True), BankOptions(workers=1), interrupt)
-    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(
-        list_drawable_cases(BankPlan(SEED, 1, brief=True))
-    )
+        prove(tmp_path / "bank", PLAN, BankOptions(workers=1), interrupt)
+    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(list_drawable_cases(PLAN))
 
 
 def test_the_short_bank_is_of_this_kind():

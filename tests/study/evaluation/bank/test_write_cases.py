@@ -5,12 +5,13 @@ from dataclasses import replace
 import pytest
 
 from study.evaluation.bank.seal_cases import list_concealed_effects
+from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.draw_case import Truth, draw_case
 
 
 @pytest.fixture(scope="module")
 def case():
-    return draw_case(11, ["force_gain"], strength=0.5, name="bench case-11")
+    return draw_case(11, ["force_gain"], strength=0.5, name="bench case-11", settings=CaseSettings((0,), 500, 3))
 
 
 @pytest.mark.slow

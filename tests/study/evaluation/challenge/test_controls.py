@@ -6,12 +6,19 @@ import pytest
 from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.controls import CONTROLS, WRONG_EFFECT
 
-SHORT = CaseSettings((0,), 1000, 3)
+SHORT = CaseSettings((0,), 1000, 3, steps=4)
 
 
 @pytest.fixture(scope="module")
 def asked():
-    return {control.name: control.draw(50_031, SHORT) for control in CONTROLS}
+    """Draws each control where it is asked for."""
+
+    class Asked(dict):
+        def __missing__(self, name):
+            self[name] = {control.name: control for control in CONTROLS}[name].draw(50_031, SHORT)
+            return self[name]
+
+    return Asked()
 
 
 @pytest.mark.slow

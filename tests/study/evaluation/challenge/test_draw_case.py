@@ -7,6 +7,7 @@ import pytest
 
 from equalizer.signals.recording_checks import check_recording
 from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.draw_case import NOISE_STD, draw_case
 from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
@@ -21,14 +22,18 @@ def first_seconds(plan):
     return DrivePlan(command, tuple(replace(s, start=2000 * k, stop=2000 * (k + 1)) for k, s in enumerate(parts)))
 
 
+COARSE = CaseSettings(steps=5)
+"""Of a device whose motion is not what is tested."""
+
+
 @pytest.fixture(scope="module")
 def friction_case():
-    return draw_case(5, ["coulomb_friction"], strength=0.5)
+    return draw_case(5, ["coulomb_friction"], strength=0.5, settings=COARSE)
 
 
 @pytest.mark.slow
 def test_a_draw_repeats_from_its_seed(friction_case):
-    again = draw_case(5, ["coulomb_friction"], strength=0.5)
+    again = draw_case(5, ["coulomb_friction"], strength=0.5, settings=COARSE)
     np.testing.assert_array_equal(again.recording.response.samples, friction_case.recording.response.samples)
     assert again.truth == friction_case.truth
     np.testing.assert_array_equal(again.model.mass, friction_case.model.mass)
@@ -91,7 +96,7 @@ def test_retuning_finds_the_bench_when_nothing_hides():
     ["extra_mode", *(pytest.param(name, marks=pytest.mark.slow) for name in ("viscous_damping", "hand_impedance"))],
 )
 def test_a_further_recording_is_of_the_device_with_its_concealed_effect(effect):
-    case = draw_case(7, (effect,), strength=1.0)
+    case = draw_case(7, (effect,), strength=1.0, settings=CaseSettings(period=500))
     again = case.record_again(case.recording.command.samples, "multisine", 0.0, 1)
     difference = again.response.samples - case.recording.response.samples
     # Two readings with independent noise; without the effect they would differ by some hundred times the noise.

@@ -1,5 +1,6 @@
 """A laboratory's blind test: revealed, and scored by all that was recorded."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from study.cli.main import main
 from study.errors import StudyError
 from study.evaluation.kit.lab_kit import seal_labels
 from study.evaluation.kit.score_kit import format_score_lines, score_kit
+from study.store.disk.provenance import gather_provenance
 from study.store.formats.diagnosis_file import write_diagnosis
 
 LABELS = (
@@ -45,9 +47,14 @@ def labels_in(folder: Path, text: str = LABELS) -> Path:
     return folder / "labels.csv"
 
 
-def test_what_was_sealed_is_scored(tmp_path: Path) -> None:
-    table = labels_in(tmp_path)
+def sealed(folder: Path, text: str = LABELS) -> Path:
+    table = labels_in(folder, text)
     seal_labels(table)
+    return table
+
+
+def test_what_was_sealed_is_scored(tmp_path: Path) -> None:
+    table = sealed(tmp_path)
     said = {"rec_01": diagnosis("added_mass"), "rec_02": diagnosis(), "rec_03": diagnosis("sensor_gain")}
     score = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv")
     assert [row.right for row in score.rows] == [True, True, False, False]
@@ -62,8 +69,7 @@ def test_what_was_sealed_is_scored(tmp_path: Path) -> None:
 
 def test_leaving_out_a_diagnosis_raises_no_figure(tmp_path: Path) -> None:
     """Each of the three is wrong in another way: a change not named, a false alarm, a number outside its interval."""
-    table = labels_in(tmp_path)
-    seal_labels(table)
+    table = sealed(tmp_path)
     bad = {
         "rec_01": diagnosis("added_mass", value=0.5),
         "rec_02": diagnosis("added_mass"),
@@ -79,46 +85,31 @@ def test_leaving_out_a_diagnosis_raises_no_figure(tmp_path: Path) -> None:
 
 
 def test_a_missing_number_counts_as_outside_its_interval(tmp_path: Path) -> None:
-    table = labels_in(tmp_path)
-    seal_labels(table)
+    table = sealed(tmp_path)
     said = {"rec_02": diagnosis(), "rec_03": diagnosis("sensor_misalignment", value=8.0)}
     score = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv")
     assert [row.inside for row in score.rows] == [False, None, True, None]
 
 
-def test_a_value_of_a_change_without_a_unit_is_compared_with_no_interval(tmp_path: Path) -> None:
-    """A grip force in newtons must not be compared with the hand's mass in kilograms."""
-    table = labels_in(tmp_path, "recording,change,value,note,salt\nrec_01,held_handle,2,grip force in N,a\n")
-    seal_labels(table)
-    said = {"rec_01": diagnosis("hand_impedance")}
-    assert score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0].inside is None
-
-
-@pytest.mark.parametrize(("value", "inside"), [(0.0002, True), (0.002, False)])
-def test_a_play_is_compared_with_the_interval_of_the_effect_that_was_named(
-    tmp_path: Path, value: float, inside: bool
+@pytest.mark.parametrize(
+    ("row", "answer", "inside"),
+    [
+        # A grip force in newtons must not be compared with the hand's mass in kilograms.
+        ("held_handle,2,grip force in N", diagnosis("hand_impedance"), None),
+        ("loosened_cable,0.0002,", diagnosis("loose_joint", value=0.0002), True),
+        ("loosened_cable,0.0002,", diagnosis("loose_joint", value=0.002), False),
+        # On a rotating device an added mass is a moment of inertia.
+        ("added_mass,0.05,", diagnosis("added_mass", value=0.0004, unit="kg m^2"), None),
+        ("magnet_brake,,", diagnosis("force_gain", ("viscous_damping",)), None),
+    ],
+    ids=["no unit", "inside", "outside", "other unit", "rival that cannot be told apart"],
+)
+def test_a_value_is_compared_with_the_interval_of_the_named_effect_in_its_unit(
+    tmp_path: Path, row: str, answer: Diagnosis, inside: bool | None
 ) -> None:
-    table = labels_in(tmp_path, "recording,change,value,note,salt\nrec_01,loosened_cable,0.0002,,a\n")
-    seal_labels(table)
-    said = {"rec_01": diagnosis("loose_joint", value=value)}
-    row = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0]
-    assert (row.right, row.inside) == (True, inside)
-
-
-def test_a_value_is_not_compared_with_an_interval_in_another_unit(tmp_path: Path) -> None:
-    """On a rotating device an added mass is a moment of inertia."""
-    table = labels_in(tmp_path)
-    seal_labels(table)
-    said = {"rec_01": diagnosis("added_mass", value=0.0004, unit="kg m^2")}
-    row = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0]
-    assert (row.right, row.inside) == (True, None)
-
-
-def test_a_rival_that_cannot_be_told_apart_counts(tmp_path: Path) -> None:
-    table = labels_in(tmp_path, "recording,change,value,note,salt\nrec_01,magnet_brake,,,a\n")
-    seal_labels(table)
-    said = {"rec_01": diagnosis("force_gain", ("viscous_damping",))}
-    assert score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0].right
+    table = sealed(tmp_path, f"recording,change,value,note,salt\nrec_01,{row},a\n")
+    scored = score_kit(table, answered(tmp_path / "d", {"rec_01": answer}), tmp_path / "score.csv").rows[0]
+    assert (scored.right, scored.inside) == (True, inside)
 
 
 def test_a_table_that_was_changed_since_is_refused(tmp_path: Path) -> None:
@@ -168,8 +159,7 @@ def test_without_the_hash_it_is_said_that_only_the_file_beside_was_compared(tmp_
 
 @pytest.mark.parametrize("typed", ["", "abc", "0" * 63, "g" * 64])
 def test_what_is_no_hash_is_wrong_use(tmp_path: Path, typed: str) -> None:
-    table = labels_in(tmp_path)
-    seal_labels(table)
+    table = sealed(tmp_path)
     with pytest.raises(StudyError, match="That is no SHA-256") as refusal:
         score_kit(table, tmp_path, tmp_path / "score.csv", typed)
     assert refusal.value.exit_code == 2
@@ -177,8 +167,7 @@ def test_what_is_no_hash_is_wrong_use(tmp_path: Path, typed: str) -> None:
 
 
 def test_a_folder_without_diagnoses_is_an_error_and_the_right_one_scores_after(tmp_path: Path) -> None:
-    table, out = labels_in(tmp_path), tmp_path / "score.csv"
-    seal_labels(table)
+    table, out = sealed(tmp_path), tmp_path / "score.csv"
     (tmp_path / "empty").mkdir()
     with pytest.raises(StudyError, match="There is no such folder") as none:
         score_kit(table, tmp_path / "diagnosis", out)
@@ -191,8 +180,7 @@ def test_a_folder_without_diagnoses_is_an_error_and_the_right_one_scores_after(t
 
 
 def test_a_torn_diagnosis_is_named_by_its_folder(tmp_path: Path) -> None:
-    table = labels_in(tmp_path)
-    seal_labels(table)
+    table = sealed(tmp_path)
     folder = answered(tmp_path / "d", {"rec_01": diagnosis("added_mass"), "rec_03": diagnosis("sensor_gain")})
     torn = folder / "rec_03" / "diagnosis.json"
     torn.write_text(torn.read_text()[:200])
@@ -200,6 +188,21 @@ def test_a_torn_diagnosis_is_named_by_its_folder(tmp_path: Path) -> None:
         score_kit(table, folder, tmp_path / "score.csv")
     assert f"Get {torn.parent} again" in refusal.value.do_now
     assert not (tmp_path / "score.csv").exists()
+
+
+def test_a_copied_diagnosis_is_not_counted_twice(tmp_path: Path) -> None:
+    table = sealed(tmp_path, LABELS.replace("nothing", "added_mass"))
+    for name in ("rec_01", "rec_02"):
+        (tmp_path / f"{name}.h5").write_text("two recordings of the simulated device have the same content")
+        (tmp_path / "d" / name).mkdir(parents=True)
+        origin = gather_provenance(parents=[tmp_path / f"{name}.h5"])
+        write_diagnosis(tmp_path / "d" / name / "diagnosis.json", diagnosis("added_mass"), origin)
+    assert score_kit(table, tmp_path / "d", tmp_path / "score.csv").figures[0].hits == 2
+    shutil.copytree(tmp_path / "d" / "rec_01", tmp_path / "d" / "rec_02", dirs_exist_ok=True)
+    with pytest.raises(StudyError, match="Two diagnoses are of the same recording") as refusal:
+        score_kit(table, tmp_path / "d", tmp_path / "second.csv")
+    assert "rec_01/diagnosis.json and rec_02/diagnosis.json" in refusal.value.happened
+    assert not (tmp_path / "second.csv").exists()
 
 
 def test_the_commands_of_the_kit_do_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -162,6 +162,6 @@ def test_a_label_that_is_changed_during_the_diagnoses_breaks_its_seal(carrier, t
         path = folder.get_label_file(0)
         path.write_text(path.read_text().replace('"strength"', '"strength" '))
 
-    monkeypatch.setattr("study.evaluation.real.inject_real.diagnose_cases", answer_and_change)
+    monkeypatch.setattr("study.evaluation.bank.ask_engine.diagnose_cases", answer_and_change)
     with pytest.raises(StudyError, match="A seal is broken"):
         run_injections(tmp_path / "bank", (carrier,), (1, 4), lambda done, of: None)

@@ -183,6 +183,26 @@ def test_results_in_the_folder_of_the_recordings_are_no_recordings(
     assert (folder / "axis" / "results" / "axis" / "run" / "answer.json").is_file()
 
 
+@pytest.mark.parametrize("outs", [("results/first", "results/first"), ("first", "second")])
+def test_results_of_other_runs_or_deeper_in_the_folder_hide_no_recordings(folder: Path, outs: tuple[str, str]) -> None:
+    axis = folder / "axis"
+    for out in outs:
+        done = diagnose_folder(RealPlan(axis, axis / out), silent)
+        assert len(done.results.answers) == 1
+    assert all("results" not in trouble.location for trouble in done.results.troubles)
+
+
+@pytest.mark.parametrize(("name", "inject"), [("injected", 4), ("recordings.csv", 0)])
+def test_a_sub_folder_with_the_name_of_a_result_is_refused_before_any_work(
+    folder: Path, tmp_path: Path, name: str, inject: int
+) -> None:
+    (folder / "axis").rename(folder / name)
+    with pytest.raises(StudyError, match="A sub-folder has the name of a result") as refused:
+        diagnose_folder(RealPlan(folder, tmp_path / "out", inject=inject), silent)
+    assert name in refused.value.happened
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_folder_that_is_a_link_keeps_its_name_and_so_its_answers(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(folder / "axis")
     (recording,) = read_real_folder(tmp_path / "link").recordings

@@ -10,8 +10,15 @@ from study.errors import StudyError
 from study.evaluation.bank.laws import prove_laws as prove_laws_module
 from study.evaluation.bank.laws.prove_laws import LawBlindTest, prove_laws, reveal_laws
 from study.evaluation.bank.laws.seal_laws import get_fresh_motions_path, read_fresh_motions, seal_laws
-from study.evaluation.bank.laws.write_law_proof import format_law_lines, write_law_proof
-from study.evaluation.bank.proof_folder import RECORDING_FILE, SETTINGS_FILE, ProofFolder, open_proof_folder
+from study.evaluation.bank.laws.write_law_proof import format_law_lines, format_law_summary, write_law_proof
+from study.evaluation.bank.proof_folder import (
+    ANSWER_FILE,
+    RECORDING_FILE,
+    SETTINGS_FILE,
+    WORKER_DIED_KEY,
+    ProofFolder,
+    open_proof_folder,
+)
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan
 from study.evaluation.bank.sealed_bank import BankOptions
@@ -49,6 +56,7 @@ def test_fresh_motion_lies_with_the_label(sealed):
     assert len(found[0].signals["t"]) == len(found[0].contributions[truth["axes"][0]])
 
 
+@pytest.mark.slow
 def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
     copy = open_proof_folder(tmp_path / "copy", SEED, True, "laws")
     for name in ("labels.sha256", "sealed/00000.json"):
@@ -58,6 +66,7 @@ def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
         reveal_laws(copy, 1)
 
 
+@pytest.mark.slow
 def test_a_case_without_answer_and_recording_is_drawn_again_and_not_left_out(sealed, tmp_path, monkeypatch):
     copy = tmp_path / "copy"
     shutil.copytree(sealed.path, copy)
@@ -76,6 +85,20 @@ def test_the_commit_is_that_of_the_code_that_answered(tmp_path):
     assert json.loads((tmp_path / "proof.json").read_text())["commit"] == "unknown: the code has changed since"
 
 
+@pytest.mark.slow
+def test_a_case_whose_process_was_killed_is_said_and_how_to_go_on(sealed, tmp_path, monkeypatch):
+    def die(folder, names, *_, keep):
+        for name in names:
+            (folder.open / name / ANSWER_FILE).write_text(json.dumps({"failed": "it died", WORKER_DIED_KEY: True}))
+
+    shutil.copytree(sealed.path, tmp_path / "copy")
+    monkeypatch.setattr(prove_laws_module, "diagnose_and_count", die)
+    done = prove_laws(tmp_path / "copy", BankPlan(SEED, 1, brief=True), BankOptions(), lambda what, done, of: None)
+    assert any("1 case has no answer" in line and "same command again" in line for line in format_law_lines(done))
+    assert json.loads(format_law_summary(done))["unanswered"] == 1
+
+
+@pytest.mark.slow
 def test_a_folder_of_effects_is_no_folder_of_laws(sealed):
     with pytest.raises(StudyError, match="another bank"):
         open_proof_folder(sealed.path, SEED, True)
