@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from protocols.definition.field_types import MAX_AMPLITUDE_N
 from protocols.definition.plausibility import PlausibilitySettings
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
@@ -79,7 +80,7 @@ class SafetySettings:
         float,
         Field(
             gt=0,
-            le=3.0,
+            le=MAX_AMPLITUDE_N,
             description="Upper limit of the norm of the stimulus force, without spring and damper; at most 3 N in "
             "any protocol. With spring and damper the command may be larger: see total_cap_n.",
         ),

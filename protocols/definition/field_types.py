@@ -1,4 +1,4 @@
-"""Pydantic types with validation for values that occur in several tables of a protocol file: names and frequencies.
+"""Validation of values that occur in several tables of a protocol file: names, frequencies, force amplitudes.
 
 Used by the other modules of `protocols.definition`. Where no reason is stated, a bound is chosen.
 """
@@ -8,6 +8,9 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from protocols.definition.problem import Problem, refuse
+
+MAX_AMPLITUDE_N = 3.0
+"""Highest force amplitude (N) that a protocol may set: the cap with a hand on the handle (docs/safety.md)."""
 
 
 def _require_whole_tenths(frequency_hz: float) -> float:

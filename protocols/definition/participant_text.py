@@ -17,6 +17,10 @@ Sentence = Annotated[str, Field(min_length=1, max_length=500)]
 """Text that a participant reads in one piece, such as a question or a statement of consent."""
 Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 """Name of a question's answer in the log: a lower-case letter, then up to 39 such letters, digits and underscores."""
+AnswerText = Annotated[str, Field(min_length=1, max_length=80)]
+"""Logged value of an answer, or meaning of an end of a scale: short enough for a table."""
+MAX_CHOICES = 9
+"""Largest number of answers to choose from: each has a key from 1 to 9."""
 MAX_SCALE_STEPS = 11
 """Largest number of steps of a rating scale. Chosen: 0 to 10."""
 
@@ -60,12 +64,12 @@ class Question:
     question: Annotated[Sentence, Field(description="Text of the question.")]
     choices: Annotated[
         tuple[Sentence, ...],
-        Field(max_length=9, description="Answers to choose from. Default: none, see number and scale."),
+        Field(max_length=MAX_CHOICES, description="Answers to choose from. Default: none, see number and scale."),
     ] = ()
     codes: Annotated[
-        tuple[Annotated[str, Field(min_length=1, max_length=80)], ...],
+        tuple[AnswerText, ...],
         Field(
-            max_length=9,
+            max_length=MAX_CHOICES,
             description="Logged value of each choice, the same in every language. Default: the choices as written.",
         ),
     ] = ()
@@ -79,7 +83,7 @@ class Question:
         Field(max_length=2, description="First and last step of a rating scale, such as [1, 7]. Default: none."),
     ] = ()
     ends: Annotated[
-        tuple[Annotated[str, Field(min_length=1, max_length=80)], ...],
+        tuple[AnswerText, ...],
         Field(max_length=2, description="Meaning of the two ends of the scale. Default: not stated."),
     ] = ()
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from protocols.definition.field_types import StimulusFrequency
+from protocols.definition.field_types import MAX_AMPLITUDE_N, StimulusFrequency
 from protocols.definition.participant_text import Sentence
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
@@ -142,7 +142,7 @@ class DemoSettings:
     """Labelled demonstration of both directions at every frequency, before the first question."""
 
     level_n: Annotated[
-        float, Field(ge=0, le=3.0, description="Amplitude, in newtons. Default 0: no demonstration.")
+        float, Field(ge=0, le=MAX_AMPLITUDE_N, description="Amplitude, in newtons. Default 0: no demonstration.")
     ] = 0.0
     rove_db: RoveDb = 0.0
     seconds: Annotated[
@@ -166,7 +166,7 @@ class PracticeSettings:
         float,
         Field(
             ge=0.001,
-            le=3.0,
+            le=MAX_AMPLITUDE_N,
             description="Amplitude of the practice trials, or the middle of its range (`rove_db`). Default 2: well "
             "above most thresholds, well below the cap.",
         ),

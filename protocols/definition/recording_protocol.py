@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from protocols.definition.apparatus import SafetySettings, SpringSettings, TestDirections
-from protocols.definition.field_types import Name, Source, Title
+from protocols.definition.field_types import MAX_AMPLITUDE_N, Name, Source, Title
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.recording_segments import Segment
 from protocols.definition.staircase_rule import STRICT
@@ -74,7 +74,7 @@ class RecordingProtocol:
         float,
         Field(
             gt=0,
-            le=3.0,
+            le=MAX_AMPLITUDE_N,
             description="Lowest amplitude to which an excitation is reduced. Default 0.2: about the friction of such "
             "a device, below which it hardly moves.",
         ),

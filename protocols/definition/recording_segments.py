@@ -10,11 +10,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from protocols.definition.field_types import Frequency, SineFrequency
+from protocols.definition.field_types import MAX_AMPLITUDE_N, Frequency, SineFrequency
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
 
-Amplitude = Annotated[float, Field(gt=0, le=3.0, description="Peak of the force, in newtons.")]
+Amplitude = Annotated[float, Field(gt=0, le=MAX_AMPLITUDE_N, description="Peak of the force, in newtons.")]
 """Peak of an excitation in newtons; 3 N is the safety limit of a stimulus with a hand (docs/safety.md)."""
 AxisName = Annotated[
     Literal["x", "y", "z", "direction_1", "direction_2"],
@@ -102,7 +102,11 @@ class MultisineSegment:
     to_hz: Annotated[Frequency, Field(description="Upper limit of the lines' frequencies.")]
     amplitude_n: Annotated[
         float,
-        Field(gt=0, le=3.0, description="Peak of the force, in newtons; along all axes, peak of the force's norm."),
+        Field(
+            gt=0,
+            le=MAX_AMPLITUDE_N,
+            description="Peak of the force, in newtons; along all axes, peak of the force's norm.",
+        ),
     ]
     along: Annotated[
         Literal["x", "y", "z", "direction_1", "direction_2", "all"],

@@ -8,7 +8,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from protocols.definition.field_types import StimulusFrequency
+from protocols.definition.field_types import MAX_AMPLITUDE_N, StimulusFrequency
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
 
@@ -28,7 +28,8 @@ class DetectionSettings:
         ),
     ] = ()
     start_n: Annotated[
-        float, Field(ge=0.001, le=3.0, description="Level of the first trial. Default 0.5: felt by most hands.")
+        float,
+        Field(ge=0.001, le=MAX_AMPLITUDE_N, description="Level of the first trial. Default 0.5: felt by most hands."),
     ] = 0.5
     interval_s: Annotated[
         float,

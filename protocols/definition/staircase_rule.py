@@ -13,6 +13,7 @@ from typing import Annotated, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from protocols.definition.field_types import MAX_AMPLITUDE_N
 from protocols.definition.problem import Problem, refuse
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -73,10 +74,12 @@ class StaircaseRule:
     """Rule that chooses the levels of a run: a transformed up-down rule, or the Psi method (`bayesian`). Numbers
     without a default must be stated by the experimenter."""
 
-    start_n: Annotated[float, Field(ge=0.001, le=3.0, description="Level of the first trial of every run, in newtons.")]
+    start_n: Annotated[
+        float, Field(ge=0.001, le=MAX_AMPLITUDE_N, description="Level of the first trial of every run, in newtons.")
+    ]
     cap_n: Annotated[
         float,
-        Field(gt=0, le=3.0, description="Highest level, in newtons; at most 3 N. Only roving exceeds it."),
+        Field(gt=0, le=MAX_AMPLITUDE_N, description="Highest level, in newtons; at most 3 N. Only roving exceeds it."),
     ]
     up_after_wrong: Annotated[
         int, Field(ge=1, le=10, description="Number of wrong answers in a row that raise the level.")

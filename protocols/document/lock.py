@@ -6,7 +6,8 @@ by `study.store.formats.protocol_files`, which reads and writes the file, and by
 """
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from protocols.definition.recording_protocol import RecordingProtocol
@@ -34,11 +35,15 @@ class ProtocolLock:
     """Time of the lock, UTC, ISO 8601."""
     hapteq: str
     """Version of the program hapteq that made the lock."""
+    words: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Texts of a protocol by key, which a later version of the program may have changed; empty for the English of the
+    program, and in locks of earlier versions."""
 
 
 def make_lock(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq_version: str) -> ProtocolLock:
     """Make the lock of a protocol. locked_utc: time, ISO 8601; hapteq_version: version of the program that makes it."""
-    return ProtocolLock(protocol.name, hash_protocol(protocol), locked_utc, hapteq_version)
+    words = protocol.text.words if isinstance(protocol, StudyProtocol) else {}
+    return ProtocolLock(protocol.name, hash_protocol(protocol), locked_utc, hapteq_version, words)
 
 
 def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, locked_time: str) -> None:
@@ -67,6 +72,7 @@ def lock_to_json(lock: ProtocolLock) -> str:
         "hash": lock.hash,
         "locked_utc": lock.locked_utc,
         "hapteq": lock.hapteq,
+        **({"words": dict(lock.words)} if lock.words else {}),
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
@@ -86,4 +92,7 @@ def lock_from_json(text: str) -> ProtocolLock:
     missing_keys = [key for key in ("name", "hash", "locked_utc", "hapteq") if not isinstance(document.get(key), str)]
     if missing_keys:
         raise LockError(f"the lock lacks the text {', '.join(missing_keys)}")
-    return ProtocolLock(document["name"], document["hash"], document["locked_utc"], document["hapteq"])
+    words = document.get("words", {})
+    if not isinstance(words, dict) or not all(isinstance(text, str) for text in words.values()):
+        raise LockError("the lock's words are no texts by key")
+    return ProtocolLock(document["name"], document["hash"], document["locked_utc"], document["hapteq"], words)

@@ -16,6 +16,13 @@ from protocols.definition.study_protocol import ScheduleSettings, StudyProtocol
 from protocols.procedure.staircase import to_db, to_newton
 from protocols.trial import Phase
 
+BALANCED_BLOCK_TRIALS = 8
+"""Block length (trials) within which balanced directions occur equally often; even. Chosen; part of the format: a
+change would change the draws of earlier sessions."""
+_CATCH_KEY, _DETECTION_KEY, _ROVE_KEY = 0, 1, 2
+"""Purpose in the keys of four elements: the last element for the direction in detection and for roving; the keys of
+catch trials end in `_CATCH_KEY` and 0. A key of four elements never gives the same words as a trial's key of three."""
+
 
 def make_williams_rows(condition_count: int) -> tuple[tuple[int, ...], ...]:
     """Make a Williams design (Latin square balanced for first-order carry-over): orders of the conditions 0 to n - 1.
@@ -40,11 +47,6 @@ def make_williams_rows(condition_count: int) -> tuple[tuple[int, ...], ...]:
     if condition_count % 2 == 0:
         return rows
     return rows + tuple(row[::-1] for row in rows)
-
-
-BALANCED_BLOCK_TRIALS = 8
-"""Block length (trials) within which balanced directions occur equally often; even. Chosen; part of the format: a
-change would change the draws of earlier sessions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,11 +153,6 @@ def _draw_level_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...
     # The upper 53 bits, as a number in the open interval (0, 1).
     uniform = ((draw_words(seed, key, 1)[0] >> 11) + 0.5) * 2.0**-53
     return to_newton(to_db(level_n) + rove_db * (uniform - 0.5))
-
-
-_CATCH_KEY, _DETECTION_KEY, _ROVE_KEY = 0, 1, 2
-"""Purpose in the keys of four elements: the last element for the direction in detection and for roving; the keys of
-catch trials end in `_CATCH_KEY` and 0. A key of four elements never gives the same words as a trial's key of three."""
 
 
 def are_labels_swapped(settings: ScheduleSettings, frequency_count: int, participant_number: int) -> bool:

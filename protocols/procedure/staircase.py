@@ -79,9 +79,10 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     counted_state = _count_answer(rule, state, correct)
     if rule.is_bayesian:
         return _apply_psi(rule, counted_state, correct)
-    if counted_state.wrong_in_a_row >= _count_wrong_needed(rule, state):
+    is_initial = _is_in_initial_phase(rule, state)
+    if counted_state.wrong_in_a_row >= (1 if is_initial else rule.up_after_wrong):
         return _move_level(rule, counted_state, Heading.UP)
-    if counted_state.right_in_a_row >= _count_right_needed(rule, state):
+    if counted_state.right_in_a_row >= (1 if is_initial else rule.down_after_right):
         return _move_level(rule, counted_state, Heading.DOWN)
     return counted_state
 
@@ -179,16 +180,6 @@ def _find_step_db(rule: StaircaseRule, reversals_before: int, is_reversal: bool)
             return phase.step_db
         reversal_count -= phase.reversals
     return rule.steps[-1].step_db
-
-
-def _count_wrong_needed(rule: StaircaseRule, state: StaircaseState) -> int:
-    """Return the number of consecutive wrong answers that raise the level."""
-    return 1 if _is_in_initial_phase(rule, state) else rule.up_after_wrong
-
-
-def _count_right_needed(rule: StaircaseRule, state: StaircaseState) -> int:
-    """Return the number of consecutive right answers that lower the level."""
-    return 1 if _is_in_initial_phase(rule, state) else rule.down_after_right
 
 
 def _is_in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:

@@ -156,8 +156,8 @@ SCREEN_TEXTS: dict[str, str] = {
     "your fault, and the trial is repeated.",
     "void_screen": "The screen did not react for a moment: it was stopped, or the computer was too busy. The force was "
     "taken away. This was not your fault, and the trial is repeated.",
-    "void_sensor": "The sensor at the handle gave too few readings in this trial. This was not "
-    "your fault, and the trial is repeated.",
+    "void_sensor": "The sensor at the handle gave too few readings in this trial. This was not your fault, and the "
+    "trial is repeated.",
     "void_because": "It is void: {reason}.",
     # The end.
     "end_thanks": "Thank you",

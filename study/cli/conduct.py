@@ -34,6 +34,9 @@ from study.workflows.session.simulated_participant import make_simulated_partici
 from study.workflows.trial.display import HumanHand
 from study.workflows.trial.requests_port import QueuedRequests
 
+LONGEST_NAME = 15
+"""Letters and digits of a simulated participant's name that fit into a participant code, which has 16 at most."""
+
 
 @dataclass(frozen=True, slots=True)
 class SittingOptions:
@@ -133,10 +136,6 @@ def _provide_participant(
     yield Participant(display=display, hand=HumanHand(), clock=clock, requests=requests)
     # Results are not for the participant, who may still sit there.
     typer.echo(f"\n{words['for_experimenter']}", err=True)
-
-
-LONGEST_NAME = 15
-"""Letters and digits of a simulated participant's name that fit into a participant code, which has 16 at most."""
 
 
 def make_simulated_code(observer: str) -> str:

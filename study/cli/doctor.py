@@ -221,10 +221,8 @@ def _print_findings(examination: "Examination") -> None:
 
 def _summarise_findings(findings: "tuple[DeviceFinding, ...]") -> str:
     """Summarise in one or two sentences how many findings are not fine, and how many of these are warnings."""
-    failed_count, warning_count = (
-        sum(not finding.fine for finding in findings),
-        sum(finding.warning for finding in findings),
-    )
+    failed_count = sum(not finding.fine for finding in findings)
+    warning_count = sum(finding.warning for finding in findings)
     if not failed_count:
         return f"All {len(findings)} checks are fine."
     warning_note = (

@@ -29,9 +29,11 @@ def import_recording(
 ) -> None:
     """Write one recording: units in SI, all channels on one rate, clocks aligned. All changes are reported.
 
-    Without a map, three kinds of files are read: tables and arrays whose names contain units (time [s], fx [N], x_mm,
-    ...), files that a shipped map fits, and hapteq recordings. For other files a map to be completed is printed.
+    Without a map, three kinds of files are read: tables and arrays whose names contain units (time [s], fx [N],
+    pos_mm, ...), files that a shipped map fits, and hapteq recordings. For other files a map to be completed is
+    printed.
     """
+    from study.cli.look import print_lines
     from study.cli.progress import show_late_bar
     from study.importing.map_format.map_errors import MapNeededError
     from study.workflows.recording.import_recording import ImportPlan, require_new_output
@@ -57,5 +59,4 @@ def import_recording(
         typer.echo(json.dumps(document, indent=2))
     else:
         typer.echo(str(out))
-    for note in import_result.notes:
-        typer.echo(f"Note: {note}", err=True)
+    print_lines((f"Note: {note}" for note in import_result.notes), to_stderr=True)

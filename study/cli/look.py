@@ -27,7 +27,12 @@ def look(
     """Show signals, spectra, coherence, levels and repeats; check units, clock, derivatives, lags, clipping and steps.
     Exit code 0 also where a check fails: that is a result."""
     from study.cli.progress import show_late_bar
-    from study.workflows.recording.look_at_recordings import inspect_recordings, make_look_document, write_look_page
+    from study.workflows.recording.look_at_recordings import (
+        inspect_recordings,
+        list_import_notes,
+        make_look_document,
+        write_look_page,
+    )
 
     with show_late_bar("Looking (%)", total=100) as show_percent:
         overviews = inspect_recordings(recordings, lambda share: show_percent(round(100 * share)))
@@ -36,6 +41,8 @@ def look(
     else:
         for overview in overviews:
             print_lines(format_overview(overview, list_passed_checks))
+    import_notes = dict.fromkeys(note for overview in overviews for note in list_import_notes(overview))
+    print_lines((f"Note: {note}" for note in import_notes), to_stderr=True)
     if out is not None:
         typer.echo(f"Report: {write_look_page(overviews, out)}", err=True)
 
@@ -112,9 +119,9 @@ MAX_SEGMENT_ROWS = 20
 """Largest number of segments that are listed in the terminal; the page of --out lists all. Chosen."""
 
 
-def print_lines(lines: Iterable[str]) -> None:
+def print_lines(lines: Iterable[str], *, to_stderr: bool = False) -> None:
     """Print lines; control characters, which may come from a file, are replaced."""
     from study.session.views.printable import replace_unprintable
 
     for line in lines:
-        typer.echo(replace_unprintable(line))
+        typer.echo(replace_unprintable(line), err=to_stderr)

@@ -14,8 +14,7 @@ from study.errors import StudyError, WrongUseError
 from study.tui.keys.answer_keys import parse_keys
 
 CONTEXT_SETTINGS = {"allow_extra_args": True, "ignore_unknown_options": True}
-"""Settings of typer, read by `command_table`: options unknown to `serve` are accepted, and passed on to `hapteq study`.
-"""
+"""Settings of typer, read by `command_table`: options unknown to `serve` are accepted for `hapteq study`."""
 
 WILDCARD_ADDRESSES = ("0.0.0.0", "::", "")
 """Addresses that mean every interface of this machine: a server can listen on them; a browser needs another."""

@@ -110,8 +110,8 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
     """Check fades (known shape, 0 to 10 s, chosen), format, force and slew rate of a repeated stimulus. Its slew rate
     includes the steps from the loop's last sample to its first and, with an onset, from zero through the onset into the
-    loop; with neither onset nor fade-in, from zero to the first sample. rate_hz: rate of the device. Raises
-    `DeviceError` for a stimulus that is not within the limits."""
+    loop; with neither onset nor fade-in, or one of a single tick, from zero to the first sample at full strength.
+    rate_hz: rate of the device. Raises `DeviceError` for a stimulus that is not within the limits."""
     if stimulus.fade_shape not in FADE_SHAPES:
         raise _make_refusal_error(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
     for setting_name, fade_s in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):
@@ -123,8 +123,8 @@ def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> No
     if stimulus.onset is not None:
         _check_forces(stimulus.onset, limits, rate_hz)
         _check_steps(np.diff(stimulus.onset.samples, axis=0, prepend=0.0, append=samples[:1]), limits, rate_hz)
-    elif round(stimulus.fade_in_s * rate_hz) == 0:  # the force begins at once with the loop's first sample
-        _check_steps(samples[:1], limits, rate_hz)
+    elif (fade_ticks := round(stimulus.fade_in_s * rate_hz)) <= 1:  # from zero to the full force within a tick
+        _check_steps(samples[[fade_ticks % len(samples)]], limits, rate_hz)
 
 
 def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:

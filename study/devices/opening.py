@@ -256,6 +256,15 @@ def get_limit_test_force_n() -> float:
     return TEST_FORCE_N
 
 
+def require_testable_device(name: str, settings: DeviceSettings) -> None:
+    """Raise `DeviceError` where the driver of a real device lacks the methods that `accept_device` needs. No force."""
+    from study.devices.force_dimension.force_limit_check import require_testable
+    from study.devices.rigs_by_name import RIGS_BY_NAME
+
+    with contextlib.closing(RIGS_BY_NAME[name](settings, 0)) as rig:
+        require_testable(rig)
+
+
 def accept_device(
     name: str, settings: DeviceSettings, clock: Clock, operator: str, baseline: tuple[str, str] = ("", "")
 ) -> str:
@@ -263,33 +272,29 @@ def accept_device(
     the cap, stop the loop; write the acceptance if the force stayed within the cap and was switched off. Returns a
     sentence with the results. Raises `DeviceError`. operator: name of the person; baseline: file name and SHA-256 of
     the recording for the daily check."""
+    from study.devices.force_dimension import force_limit_check
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
-    from study.devices.force_dimension.force_limit_check import (
-        COMMAND_TO_CAP_RATIO,
-        TEST_FORCE_N,
-        check_cap_holds,
-        check_force_vanishes,
-        require_testable,
-    )
     from study.devices.rigs_by_name import RIGS_BY_NAME
     from study.devices.safe import SafeDevice
 
-    limits = replace(settings.limits, stimulus_cap_n=TEST_FORCE_N, total_cap_n=TEST_FORCE_N)
+    test_force_n = get_limit_test_force_n()
+    commanded_n = force_limit_check.COMMAND_TO_CAP_RATIO * test_force_n
+    limits = replace(settings.limits, stimulus_cap_n=test_force_n, total_cap_n=test_force_n)
     settings = replace(settings, hand_on_handle=False, limits=limits)
     rig: Any = RIGS_BY_NAME[name](settings, 0)
     try:
-        require_testable(rig)
+        force_limit_check.require_testable(rig)
         device = SafeDevice(rig, settings, clock)
         with contextlib.closing(device):
-            largest_force_n = check_cap_holds(device, rig)
-            force_off_after_s = check_force_vanishes(device, rig)
+            largest_force_n = force_limit_check.check_cap_holds(device, rig)
+            force_off_after_s = force_limit_check.check_force_vanishes(device, rig)
     finally:
         rig.close()
     today, info = clock.utc()[:10], device.info
-    test_results = TEST_FORCE_N, force_off_after_s, COMMAND_TO_CAP_RATIO * TEST_FORCE_N, largest_force_n
+    test_results = test_force_n, force_off_after_s, commanded_n, largest_force_n
     path = write_acceptance(Acceptance(info.name, info.details, operator, today, *test_results, *baseline))
     return (
-        f"{info.name}: of {COMMAND_TO_CAP_RATIO * TEST_FORCE_N:g} N that were commanded with a cap of "
-        f"{TEST_FORCE_N:g} N it gave {largest_force_n:.2g} N; a force of {TEST_FORCE_N:g} N was gone "
-        f"{1000 * force_off_after_s:.0f} ms after the loop; {path}"
+        f"{info.name}: of {commanded_n:g} N that were commanded with a cap of {test_force_n:g} N it gave "
+        f"{largest_force_n:.2g} N; a force of {test_force_n:g} N was gone {1000 * force_off_after_s:.0f} ms after the "
+        f"loop; {path}"
     )

@@ -22,8 +22,10 @@ from study.importing.map_format.map_errors import ImportProblemError
 from study.importing.uniform_stamps import GRID_TOLERANCE, IntArray, find_decimal_unit, fit_uniform_rate
 
 _GAP_STEPS = 3
-"""A step longer than this many median steps, or than 1.5 periods of a uniform grid, is a gap, unless the map states
-`gap_s`. Chosen."""
+"""A step longer than this many median steps is a gap, unless the map states `gap_s`. Chosen."""
+_GAP_PERIODS = 1.5
+"""With a rate or a uniform grid, a step longer than this many periods is a gap, so that one skipped row (a step of two
+periods) is one, unless the map states `gap_s`. Chosen: halfway between one and two periods."""
 _HOUR_S = 3600.0
 """Step (s) of a clock that is set to summer time or back."""
 _COUNTER_LIMITS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
@@ -117,14 +119,13 @@ class TimeBase:
 
 def make_time_base(clock: ClockMap, namespace: Namespace) -> TimeBase:
     """Make the time base of a clock of the map, without its offset to other clocks. namespace: the arrays of the file.
-    With a rate, a step of more than 1.5 sample periods is a gap, unless the map states `gap_s` (chosen). Raises
-    ImportProblemError where the rate cannot be computed or is not positive, or the stamps are unusable."""
+    Raises ImportProblemError where the rate cannot be computed or is not positive, or the stamps are unusable."""
     if clock.time:
         return _make_base_from_stamps(clock, namespace)
     rate_hz = PLACEHOLDER_RATE_HZ if clock.unknown else clock.rate_hz or namespace.compute_number(clock.rate)
     if not rate_hz > 0:
         raise ImportProblemError(f"clock '{clock.name}': its rate, {clock.rate}, is {rate_hz:g}; it must be above 0")
-    return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or 1.5 / rate_hz)
+    return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or _GAP_PERIODS / rate_hz)
 
 
 def _make_base_from_stamps(clock: ClockMap, namespace: Namespace) -> TimeBase:
@@ -153,9 +154,8 @@ def _make_base_from_stamps(clock: ClockMap, namespace: Namespace) -> TimeBase:
             "imported together"
         )
     gap_s = clock.gap_s or _GAP_STEPS * float(np.median(np.diff(stamps_s)))
-    # On a uniform grid, one skipped row (a step of two periods) is a gap.
     if sample_index is not None and not clock.gap_s:
-        gap_s = min(gap_s, 1.5 / rate_hz)
+        gap_s = min(gap_s, _GAP_PERIODS / rate_hz)
     return TimeBase(clock.name, rate_hz, stamps_s, sample_index, gap_s)
 
 

@@ -14,7 +14,8 @@ from study.devices.accelerometer.samples import PacketCounts, Samples
 
 BUFFER_S = 300.0
 """Time (s) for which samples are kept after their arrival: enough for a recording of three minutes and the two minutes
-before it to which the clock is fitted (`sensor.CLOCK_FIT_S`)."""
+before it to which the clock is fitted (`sensor.CLOCK_FIT_S`). Of a longer recording the acceleration of the beginning
+is missing: at 10 kHz, five minutes are 120 MB already."""
 
 
 class RowBuffer:

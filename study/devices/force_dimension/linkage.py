@@ -34,7 +34,7 @@ BASE_JOINTS_MASK = 0b111
 
 REACH_TOLERANCE_M = 2e-4
 """A position is out of reach where the position computed from its encoder counts differs by more than this (m). The
-encoders resolve about 10 um."""
+encoders resolve about 1e-5 m."""
 POSITION_TOLERANCE_M = 1e-3
 """Largest accepted difference (m) between the handle's reported position and that of its reported joint angles."""
 

@@ -92,12 +92,14 @@ def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     raise ValueError(f"it is of version {version[0]}.{version[1]} of the format; 1.0 and 2.0 can be read")
 
 
-def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
-    """Read datasets by path, as in `run1/force`. transposed: a file of Matlab 7.3, whose dimensions are reversed; names
-    then have dots in place of slashes. Texts, cells and objects are replaced by placeholders, except one-dimensional
-    arrays of texts, which may be dates, and other types such as compound ones. Left out are datasets without a shape,
-    and names that begin with "#" (internal to Matlab). Raises UnusableFileError where the file cannot be read."""
+def read_hdf5_arrays(path: Path, *, transposed: bool) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Read datasets by path, as in `run1/force`, and sentences on scales that were not applied. transposed: a file of
+    Matlab 7.3, whose dimensions are reversed; names then have dots in place of slashes. Texts, cells and objects are
+    replaced by placeholders, except one-dimensional arrays of texts, which may be dates, and other types such as
+    compound ones. Left out are datasets without a shape, and names that begin with "#" (internal to Matlab). Raises
+    UnusableFileError where the file cannot be read."""
     arrays: dict[str, Array] = {}
+    notes: list[str] = []
     with open_any_hdf5(path, "HDF5 file") as file:
         for name, entry in iterate_datasets(file):
             if name.startswith("#") or entry.shape is None:
@@ -114,8 +116,22 @@ def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
                 values = _NON_NUMERIC
             else:
                 values = np.array(_OTHER_DESCRIPTION, dtype=object)
-            arrays[name.replace("/", ".") if transposed else name] = values.T if transposed else values
-    return arrays
+            array_name = name.replace("/", ".") if transposed else name
+            arrays[array_name] = values.T if transposed else values
+            if stated_scale := _describe_scale(entry):
+                notes.append(
+                    f"{array_name}: its attribute {stated_scale} was not applied; a map can state it in `value`."
+                )
+    return arrays, tuple(notes)
+
+
+def _describe_scale(entry: Any) -> str:
+    """Describe the scale and offset that the attributes of a dataset state (conventions of netCDF), each cut to 60
+    characters; empty where there are none, or they change nothing."""
+    neutral_values = {"scale_factor": 1, "add_offset": 0}
+    stated = {name: np.ravel(entry.attrs[name]).tolist() for name in neutral_values if name in entry.attrs}
+    return " and ".join(f"{name} = {', '.join(map(str, values)):.60}" for name, values in stated.items()
+                        if values != [neutral_values[name]])  # fmt: skip
 
 
 def _describe_unread_class(entry: Any) -> str:

@@ -5,7 +5,7 @@ The format follows from the ending of the file; `csv_arrays`, `workbook_arrays`,
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,7 @@ class Arrays:
     clocks: tuple[str, ...] = ()
     """Names of arrays of dates or clock times, converted to seconds since the first."""
     notes: tuple[str, ...] = ()
-    """Sentences on how dates and clock times were read, and on what was left out."""
+    """Sentences on how dates and clock times were read, and on what was left out or not applied."""
 
     @property
     def name(self) -> str:
@@ -101,19 +101,21 @@ def _read_by_ending(path: Path, settings: CsvMap) -> Table:
         return read_csv_arrays(path, settings)
     if path.suffix.lower() in WORKBOOK_ENDINGS:
         return read_workbook_arrays(path, settings)
-    return convert_times(_read_non_table(path))
+    arrays, notes = _read_non_table(path)
+    table = convert_times(arrays)
+    return replace(table, notes=(*table.notes, *notes))
 
 
-def _read_non_table(path: Path) -> dict[str, Array]:
-    """Read the arrays of a file that is no table or workbook. Raises ValueError for an unknown ending, and the errors
-    of the reader of the format."""
+def _read_non_table(path: Path) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Read the arrays of a file that is no table or workbook, and sentences about them. Raises ValueError for an
+    unknown ending, and the errors of the reader of the format."""
     match path.suffix.lower():
         case ".npz" | ".npy":
-            return read_npz_arrays(path)
+            return read_npz_arrays(path), ()
         case ".json" | ".jsonl" | ".ndjson":
-            return read_json_arrays(path)
+            return read_json_arrays(path), ()
         case ".mat":
-            return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat5_arrays(path)
+            return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else (read_mat5_arrays(path), ())
         case ending if ending in HDF5_ENDINGS:
             return read_hdf5_arrays(path, transposed=False)
         case ".xls" | ".ods" | ".xlsb":

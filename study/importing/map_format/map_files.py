@@ -73,8 +73,7 @@ def _assign_parallel(import_map: ImportMap, files: Sequence[Path]) -> PartFiles:
     or several fit the pattern of a clock."""
     by_clock = {}
     for clock in import_map.clock:
-        (path,) = _find_single_file(clock.file or "*", files, f"clock '{clock.name}'")
-        by_clock[clock.name] = path
+        by_clock[clock.name] = _find_single_file(clock.file or "*", files, f"clock '{clock.name}'")
     return PartFiles(PartMap(file=" + ".join(path.name for path in by_clock.values())), by_clock)
 
 
@@ -89,15 +88,15 @@ def _assign_sequential(import_map: ImportMap, files: Sequence[Path]) -> Iterator
             yield PartFiles(part, {clock.name: path for clock in import_map.clock})
 
 
-def _find_single_file(pattern: str, files: Sequence[Path], subject: str) -> list[Path]:
-    """Find the single file that fits a pattern, as a list of one path. subject: what is in the file, for messages.
-    Raises ImportProblemError where no file or several fit."""
+def _find_single_file(pattern: str, files: Sequence[Path], subject: str) -> Path:
+    """Find the single file that fits a pattern. subject: what is in the file, for messages. Raises ImportProblemError
+    where no file or several fit."""
     matching_paths = [path for path in files if fnmatchcase(path.name, pattern)]
     if len(matching_paths) != 1:
         raise ImportProblemError(
             f"{subject} is in the file '{pattern}', which fits {len(matching_paths)} of {_list_names(files)}"
         )
-    return matching_paths
+    return matching_paths[0]
 
 
 def _list_names(files: Sequence[Path]) -> str:

@@ -38,6 +38,12 @@ from study.session.views.local_time import Zone, split_time_in_zone, to_utc
 
 _PresentationKey = tuple[int, int, int]
 """Run, trial and attempt of a presentation."""
+PROBE_PHRASES = {
+    "hand": "Probe with the hand on the handle",
+    "free": "Test whether the handle is free",
+    "reference": "Reference without a hand",
+}
+"""Beginning of the sentence about a probe, by its kind."""
 
 
 def describe_log(events: Iterable[Event], zone: Zone = to_utc) -> tuple[str, ...]:
@@ -121,14 +127,6 @@ def _describe_accompanying(event: OnsetPulsed | MaskingPlayed | ProbePlayed | Pr
         return "The masking noise was stopped."
     band = f"{event.low_hz:g} to {event.high_hz:g} Hz"
     return f"Masking noise on {_join_lines(event.output)}: {event.level_db:g} dB, {band}, seed {event.seed}."
-
-
-PROBE_PHRASES = {
-    "hand": "Probe with the hand on the handle",
-    "free": "Test whether the handle is free",
-    "reference": "Reference without a hand",
-}
-"""Beginning of the sentence about a probe, by its kind."""
 
 
 def _describe_probe(event: ProbePlayed | ProbeMeasured) -> str:

@@ -10,7 +10,10 @@ SCREEN_UNRESPONSIVE = "the screen gave no sign of life"
 SCREEN_DELAYED_BY_LOAD = f"{SCREEN_UNRESPONSIVE}: the computer was too busy"
 """As `SCREEN_UNRESPONSIVE`, where the load of the computer or the delay of the engine shows the cause."""
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
-"""The session process did not reset the watchdog of the device within its time limit `watchdog_s`."""
+"""The program did not act in time while a force was on: the session process did not reset the watchdog of the device
+within its time limit `watchdog_s`, and the force was faded out; or the control loop itself stood still (a suspended
+process, a computer that is too busy, an interruption within a tick), and it or the hardware's watchdog switched the
+force off at once. Logs have this text for all of them."""
 TICKS_MISSED = "of the 1 kHz ticks were missed"
 """End of the reason, which begins with the share of missed ticks of the control loop in percent."""
 TICKS_LATE = "of the 1 kHz ticks were late or missed"

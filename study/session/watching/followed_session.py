@@ -92,13 +92,13 @@ def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> FollowedSe
     )
 
 
-def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSession:
+def apply_followed_event(followed: FollowedSession, event: Event) -> FollowedSession:
     """Return the followed session after one more event. Raises LogContradictionError where the event cannot follow the
     previous ones."""
-    updated_session = replace(watched, state=apply_event(watched.state, event), last_utc=event.utc)
+    updated_session = replace(followed, state=apply_event(followed.state, event), last_utc=event.utc)
     match event:
         case TrialPresented():
-            return replace(updated_session, remarks=(*watched.remarks, ""))
+            return replace(updated_session, remarks=(*followed.remarks, ""))
         case TrialMeasured():
             return _set_remark(updated_session, ", ".join(flag for flag in event.flags if flag != UNMEASURED_FLAG))
         case TrialSpoiled():
@@ -106,10 +106,10 @@ def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSess
         case ProbePlayed() | ProbeMeasured():
             return _record_probe(updated_session, event)
         case FormFilled():
-            return replace(updated_session, forms=(*watched.forms, FormRecord(event.utc, event.form, event.passed)))
+            return replace(updated_session, forms=(*followed.forms, FormRecord(event.utc, event.form, event.passed)))
         case NoteTaken():
             note = NoteRecord(event.utc, event.who, event.text, event.adverse)
-            return replace(updated_session, notes=(*watched.notes, note))
+            return replace(updated_session, notes=(*followed.notes, note))
         case SessionInterrupted():
             return replace(updated_session, end_reason=event.reason)
         case SessionResumed():
@@ -117,28 +117,28 @@ def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSess
                 updated_session,
                 end_reason="",
                 sitting_utc=event.utc,
-                notes_before=len(watched.notes),
-                sitting=watched.sitting + 1,
+                notes_before=len(followed.notes),
+                sitting=followed.sitting + 1,
             )
         case _:
             return updated_session
 
 
-def _record_probe(watched: FollowedSession, event: ProbePlayed | ProbeMeasured) -> FollowedSession:
+def _record_probe(followed: FollowedSession, event: ProbePlayed | ProbeMeasured) -> FollowedSession:
     """Return the followed session after a probe began or was measured; a declined reference, which was not played, is
     ignored."""
     if isinstance(event, ProbePlayed):
-        started_s = max(0.0, compute_wall_clock_s(watched.state.opened.utc, event.utc))
+        started_s = max(0.0, compute_wall_clock_s(followed.state.opened.utc, event.utc))
         return replace(
-            watched, playing=PlayedProbe(event.number, event.kind, event.level_n, started_s, watched.sitting)
+            followed, playing=PlayedProbe(event.number, event.kind, event.level_n, started_s, followed.sitting)
         )
-    probe = watched.playing
+    probe = followed.playing
     if probe is None or probe.number != event.number:
-        return watched
+        return followed
     finished_probe = replace(probe, recording=event.recording or "", trouble=event.trouble)
-    return replace(watched, playing=None, probes=(*watched.probes, finished_probe))
+    return replace(followed, playing=None, probes=(*followed.probes, finished_probe))
 
 
-def _set_remark(watched: FollowedSession, remark: str) -> FollowedSession:
+def _set_remark(followed: FollowedSession, remark: str) -> FollowedSession:
     """Return the followed session with the remark of the latest trial replaced."""
-    return replace(watched, remarks=(*watched.remarks[:-1], remark))
+    return replace(followed, remarks=(*followed.remarks[:-1], remark))

@@ -11,23 +11,6 @@ from study.regular_file import MAX_TABLE_BYTES, read_regular
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
 
-
-def read_text(path: Path, max_bytes: int = MAX_TABLE_BYTES) -> str:
-    """Read a text file, without its byte order mark. Line ends are unchanged. Raises CannotReadError where the file
-    cannot be read, is not UTF-8, or is larger than `max_bytes`."""
-    try:
-        return read_regular(path, max_bytes).decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as problem:
-        raise CannotReadError(path, problem) from problem
-
-
-def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
-    """Write a text file atomically. Line ends are written unchanged, so that a file is the same on every system.
-    Surrogates (from a file name that is not UTF-8) become question marks. Raises AlreadyExistsError where the file
-    exists unless `overwrite`, CannotWriteError where it cannot be written."""
-    write_atomically(path, text.encode("utf-8", errors="replace"), overwrite=overwrite)
-
-
 MAX_TOML_BYTES = 2**22
 """Largest TOML file that is read (bytes). Chosen: 20 times the size of a mechanical model of 100 coordinates."""
 MAX_KEY_PARTS = 32
@@ -44,6 +27,22 @@ _TOML_TOKEN = re.compile(
 )
 """Regular expression of comments and multi-line strings, which are skipped, and of possible keys. Matches do not
 overlap, so that the time of the search is linear in the length of the file."""
+
+
+def read_text(path: Path, max_bytes: int = MAX_TABLE_BYTES) -> str:
+    """Read a text file, without its byte order mark. Line ends are unchanged. Raises CannotReadError where the file
+    cannot be read, is not UTF-8, or is larger than `max_bytes`."""
+    try:
+        return read_regular(path, max_bytes).decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise CannotReadError(path, problem) from problem
+
+
+def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
+    """Write a text file atomically. Line ends are written unchanged, so that a file is the same on every system.
+    Surrogates (from a file name that is not UTF-8) become question marks. Raises AlreadyExistsError where the file
+    exists unless `overwrite`, CannotWriteError where it cannot be written."""
+    write_atomically(path, text.encode("utf-8", errors="replace"), overwrite=overwrite)
 
 
 def read_toml_text(path: Path, kind: str) -> str:

@@ -5,6 +5,8 @@ lock is refused. Begin with `read_protocol`.
 """
 
 import os
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib.resources import files
@@ -82,7 +84,8 @@ def list_shipped_protocols() -> tuple[str, ...]:
 def read_protocol(name: Path | str, data: Path | str | None = None) -> ProtocolFile[Protocol]:
     """Read a shipped protocol by its name, or any protocol by its path. data: the data folder, if there is one.
 
-    A lock beside the file or in `data` must agree with the protocol. Raises WrongUseError (no such protocol),
+    A lock in `data` or beside the file must agree with the protocol; both are checked, and the first is returned.
+    Participants' texts that the file does not state are those of the lock. Raises WrongUseError (no such protocol),
     CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock, a table of texts).
     """
     name, data = str(name), None if data is None else Path(data)
@@ -93,11 +96,13 @@ def read_protocol(name: Path | str, data: Path | str | None = None) -> ProtocolF
         else read_toml_text(path, "protocol")
     )
     source = f"{name}.toml" if path is None else path.name
+    folders = [folder for folder in (data, path.parent if path else None) if folder is not None]
     try:
-        protocol, text = load_in_language(text, source, path.parent if path else None)
+        protocol, text = load_in_language(text, source, path.parent if path else None, find_locked_words(text, folders))
     except ProtocolError as error:
         raise ProtocolRefusedError(source, error) from error
-    return ProtocolFile(protocol, text, path, _find_lock(protocol, path, data))
+    locks = [_read_lock(locate_lock(protocol, folder), protocol) for folder in folders]
+    return ProtocolFile(protocol, text, path, next((lock for lock in locks if lock is not None), None))
 
 
 def read_study_protocol(name: Path | str, data: Path | str | None = None) -> ProtocolFile[StudyProtocol]:
@@ -135,23 +140,35 @@ def locate_lock(protocol: Protocol, folder: Path) -> Path:
     return folder / f"{protocol.name}.lock.json"
 
 
-def _find_lock(protocol: Protocol, path: Path | None, data: Path | None) -> ProtocolLock | None:
-    """Find the lock of the protocol in `data`, or else beside its file; both are checked. Raises as `_read_lock`."""
-    folders = [folder for folder in (data, path.parent if path else None) if folder is not None]
-    locks = [_read_lock(locate_lock(protocol, folder), protocol) for folder in folders]
-    return next((lock for lock in locks if lock is not None), None)
+def find_locked_words(text: str, folders: Sequence[Path]) -> Mapping[str, str]:
+    """Find the texts in the first lock in these folders of the protocol with this TOML text; empty without any. Raises
+    as `_parse_lock`."""
+    try:
+        name = tomllib.loads(text).get("name")
+    except (ValueError, RecursionError):
+        return {}  # the caller refuses it with the cause
+    locks = [_parse_lock(folder / f"{name}.lock.json") for folder in folders if name == Path(str(name)).name]
+    return next((lock.words for lock in locks if lock is not None and lock.words), {})
 
 
-def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
-    """Read and check the lock at this path; None if there is none. Raises CannotReadError, UnusableFileError for a
-    malformed lock, and LockedProtocolChangedError where the protocol differs."""
+def _parse_lock(path: Path) -> ProtocolLock | None:
+    """Read the lock at this path; None if there is none. Raises CannotReadError, and UnusableFileError for a malformed
+    lock."""
     if not os.path.lexists(path):  # a dangling link is an unreadable lock, not a missing one
         return None
     text = read_text(path, MAX_DOCUMENT_BYTES)
     try:
-        lock = lock_from_json(text)
+        return lock_from_json(text)
     except LockError as error:
         raise UnusableFileError(path, "protocol lock", (str(error),)) from error
+
+
+def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
+    """Read and check the lock at this path; None if there is none. Raises as `_parse_lock`, and
+    LockedProtocolChangedError where the protocol differs."""
+    lock = _parse_lock(path)
+    if lock is None:
+        return None
     try:
         check_lock(lock, protocol, format_time_in_zone(lock.locked_utc, convert_to_machine_zone))
     except LockError as error:

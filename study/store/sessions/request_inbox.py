@@ -43,7 +43,8 @@ _SOURCES = get_args(RequestSource)
 _MAX_REQUEST_BYTES = 1 << 16
 """Largest number of bytes of a request that are read. Chosen: a note has only a few sentences."""
 _MAX_TAKEN_PER_CALL = 50
-"""Largest number of requests taken in one call. Chosen: many requests at once must not block the session's loop."""
+"""Largest number of files taken in one call while a session runs. Chosen: many requests at once must not block the
+session's loop."""
 _request_counter = itertools.count()
 """Makes the names of this program's requests unique, and keeps them in order, within one tick of the clock."""
 
@@ -120,16 +121,15 @@ class RequestInbox:
                 self._remove(name)
                 return
 
-    def take(self) -> tuple[Request, ...]:
-        """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first; invalid ones other than
-        stops are set aside. The file of a note is kept under another name until `forget_logged`. Never raises."""
+    def take(self, max_files: int | None = _MAX_TAKEN_PER_CALL) -> tuple[Request, ...]:
+        """Take and remove the requests in up to `max_files` files (None: all), stops first, then oldest first; invalid
+        ones other than stops are set aside. The file of a note is kept under another name until `forget_logged`. Never
+        raises."""
         names = sorted(
             (name for name in self._list_names() if name[0] != "." and name not in self._ignored_names),
             key=_make_sort_key,
         )
-        return tuple(
-            request for name in names[:_MAX_TAKEN_PER_CALL] if (request := self._take_request(name)) is not None
-        )
+        return tuple(request for name in names[:max_files] if (request := self._take_request(name)) is not None)
 
     def _list_names(self) -> list[str]:
         """List the names of the files in the folder; empty where it is missing, a link, or cannot be read."""

@@ -17,10 +17,14 @@ LEGEND = f"{RIGHT_MARK} right  {WRONG_MARK} wrong  {PEAK_MARK} peak  {VALLEY_MAR
 
 LABEL_COLUMNS = 8
 """Width for the labels of the level axis in characters, including the space after them."""
-_MIN_AXIS_RATIO = 4.0
+MIN_PLOT_COLUMNS, MIN_ROWS = 8, 4
+"""Smallest size at which a staircase is drawn: columns beside the labels, and rows. Chosen."""
+MIN_AXIS_RATIO = 4.0
 """Smallest ratio of the cap to the lowest level of the axis, so that small changes of the level do not look large.
 Chosen."""
-_MAX_DOTS_PER_TRIAL = 4.0
+AXIS_MARGIN_RATIO = 0.85
+"""Largest ratio of the end of the axis to the lowest level, so that the level's mark is not on the edge. Chosen."""
+MAX_DOTS_PER_TRIAL = 4.0
 """Largest horizontal distance between trials, in dots, so that short runs of different length are drawn to the same
 scale. Chosen."""
 _THRESHOLD_DOT_SPACING = 4
@@ -31,15 +35,14 @@ _MARKS_BY_PRIORITY = (RIGHT_MARK, WRONG_MARK, VALLEY_MARK, PEAK_MARK)
 
 def draw_staircase(staircase: Staircase, columns: int, rows: int) -> tuple[str, ...]:
     """Draw the staircase in `rows` lines for a width of `columns` characters; the last line is the trial axis. A single
-    sentence if there are fewer than 8 columns beside the labels, fewer than 4 rows, or no answer."""
-    if columns < LABEL_COLUMNS + 8 or rows < 4:
+    sentence without room or without an answer."""
+    if columns < LABEL_COLUMNS + MIN_PLOT_COLUMNS or rows < MIN_ROWS:
         return ("No room to draw.",)
     if not staircase.levels_n:
         return ("Nothing was answered in this run.",)
     canvas = Canvas(columns - LABEL_COLUMNS, rows - 1)
-    # The axis ends at least 15 % below the lowest level, so that its mark is not on the edge.
-    lowest_n = min(staircase.cap_n / _MIN_AXIS_RATIO, 0.85 * min(staircase.levels_n))
-    dots_per_trial = min(_MAX_DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(staircase.levels_n) - 1))
+    lowest_n = min(staircase.cap_n / MIN_AXIS_RATIO, AXIS_MARGIN_RATIO * min(staircase.levels_n))
+    dots_per_trial = min(MAX_DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(staircase.levels_n) - 1))
 
     def compute_y(level_n: float) -> float:
         """Compute y of a level in dots, downwards: 1 at the cap, canvas.height - 2 at the lowest level of the axis."""

@@ -18,6 +18,8 @@ POLL_INTERVAL_S = 0.05
 """Interval of the signs of life (s): half of the 0.1 s that the display port allows (`display.SignOfLife`)."""
 LINE_WIDTH = 78
 """Characters per line: two less than the 80 columns of the narrowest usual terminal."""
+LEAVE = "q"
+"""Line by which the participant leaves the session, the same in every language."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,10 +113,10 @@ class Conversation:
         return result
 
     def read_line_or_leave(self) -> Line:
-        """Wait for the next line while no stimulus is played. Raises KeyboardInterrupt for "q" and at the end of the
-        input."""
+        """Wait for the next line while no stimulus is played. Raises KeyboardInterrupt for `LEAVE` and at the end of
+        the input."""
         line = self.read_line()
-        if line.word == "q":
+        if line.word == LEAVE:
             raise KeyboardInterrupt
         return line
 

@@ -17,7 +17,7 @@ from study.session.views.participant_views import (
 )
 from study.tui.drawing.direction_picture import describe_direction_ends
 from study.tui.keys.answer_keys import AnswerKeys
-from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, WaitOver
+from study.tui.line_mode.conversation import LEAVE, POLL_INTERVAL_S, Conversation, WaitOver
 from study.tui.line_mode.plain_question import PARTICIPANT_LEFT
 from study.tui.trial_replies import PAUSE
 from study.tui.trial_words import describe_felt_directions
@@ -45,7 +45,7 @@ def choose_demo(menu: DemoMenu, conversation: Conversation, keys: AnswerKeys, si
         line = conversation.wait(sign_of_life)
         if line is WaitOver.CUT_SHORT:
             return DemoDone()
-        if isinstance(line, WaitOver) or line.word == "q":
+        if isinstance(line, WaitOver) or line.word == LEAVE:
             raise KeyboardInterrupt
         if line.word in ("", "done"):
             return DemoDone()
@@ -108,7 +108,7 @@ def _wait_briefly(conversation: Conversation, sign_of_life: SignOfLife, wait_s: 
     if not sign_of_life():
         return CUT_SHORT
     line = conversation.poll_line()
-    return {"q": PARTICIPANT_LEFT, "p": PAUSE}.get(line.word) if line is not None else None
+    return {LEAVE: PARTICIPANT_LEFT, "p": PAUSE}.get(line.word) if line is not None else None
 
 
 def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> tuple[int, str]:

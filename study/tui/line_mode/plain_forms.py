@@ -4,7 +4,7 @@ from protocols.wording.words import Words
 from study.session.views.form_entry import CONFIRMED_KINDS
 from study.session.views.form_views import Form, FormField, FormReply, is_valid_answer
 from study.session.views.participant_views import DeviceReport
-from study.tui.line_mode.conversation import Conversation, Line, quote_line, remove_control_characters
+from study.tui.line_mode.conversation import LEAVE, Conversation, Line, quote_line, remove_control_characters
 from study.tui.trial_words import describe_form_origin, describe_number_limits
 
 BACK = "b"
@@ -13,7 +13,8 @@ BACK = "b"
 
 def ask_form(form: Form, conversation: Conversation) -> FormReply:
     """Ask all fields of a form, one after another; `b` returns to the previous field. In the forms of `CONFIRMED_KINDS`
-    (consent, exclusion), changed answers must be confirmed. Raises KeyboardInterrupt for q and at the end of input."""
+    (consent, exclusion), changed answers must be confirmed. Raises KeyboardInterrupt for `LEAVE` and at the end of
+    input."""
     conversation.discard_early_lines()
     words = conversation.words
     conversation.say("", form.title, *filter(None, (form.introduction, describe_form_origin(form, words))))
@@ -90,7 +91,7 @@ def _ask_field(field: FormField, field_position: tuple[int, int], conversation: 
         answer = _parse_answer(field, line, is_numbered)
         if answer is not None:
             return answer
-        if line.word == "q":
+        if line.word == LEAVE:
             raise KeyboardInterrupt
         if line.word == BACK:
             return None
@@ -105,12 +106,12 @@ def _parse_answer(field: FormField, line: Line, is_numbered: bool) -> str | None
     if not text:
         return None if field.needed else ""
     if not field.choices:
-        is_valid = line.word not in (BACK, "q") and is_valid_answer(field, text)
+        is_valid = line.word not in (BACK, LEAVE) and is_valid_answer(field, text)
         return text if is_valid else None
     if is_numbered and text.isdecimal() and 1 <= int(text) <= len(field.choices):
         return field.choices[int(text) - 1]
     matching_choices = [choice for choice in field.choices if choice.casefold() == text.casefold()]
-    if not matching_choices and line.word in (BACK, "q"):
+    if not matching_choices and line.word in (BACK, LEAVE):
         return None  # a command, also where a choice begins with this letter
     # As in the form of the screen, first letters suffice where a single choice has them: y for yes.
     matching_choices = matching_choices or [

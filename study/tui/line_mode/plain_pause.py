@@ -5,7 +5,14 @@ from collections.abc import Callable
 from protocols.wording.words import Words
 from study.session.views.participant_views import AfterPause, PauseNotice, RestNotice
 from study.session.watching.requests import NoteAsked
-from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, Line, WaitOver, remove_control_characters
+from study.tui.line_mode.conversation import (
+    LEAVE,
+    POLL_INTERVAL_S,
+    Conversation,
+    Line,
+    WaitOver,
+    remove_control_characters,
+)
 from study.tui.trial_words import describe_progress
 from study.workflows.trial.display import SignOfLife
 
@@ -15,7 +22,7 @@ COUNTDOWN_INTERVAL_S = 10.0
 
 def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignOfLife) -> float:
     """Count down an enforced rest, then wait for Enter, unless the sign of life ends it. Returns the time rested (s).
-    Raises KeyboardInterrupt where the line after the countdown is "q" or the input has ended."""
+    Raises KeyboardInterrupt where the line after the countdown is `LEAVE` or the input has ended."""
     words = conversation.words
     rest_text = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
     conversation.say("", f"{rest_text} {words.fill_count('runs_left', notice.runs_left)}")
@@ -26,7 +33,7 @@ def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignO
         conversation.discard_early_lines()
         conversation.say_texts("enter_goes_on")
         line = conversation.wait(sign_of_life)
-        if line is WaitOver.INPUT_ENDED or (isinstance(line, Line) and line.word == "q"):
+        if line is WaitOver.INPUT_ENDED or (isinstance(line, Line) and line.word == LEAVE):
             raise KeyboardInterrupt
     return conversation.clock.now_s() - start_s
 

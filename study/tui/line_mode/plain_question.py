@@ -15,7 +15,7 @@ from study.session.views.participant_views import (
 )
 from study.tui.drawing.direction_picture import describe_direction, draw_directions
 from study.tui.keys.answer_keys import AnswerKeys
-from study.tui.line_mode.conversation import Conversation, Line, WaitOver, quote_line
+from study.tui.line_mode.conversation import LEAVE, Conversation, Line, WaitOver, quote_line
 from study.tui.trial_replies import PAUSE, REPEAT, format_repeat_text
 from study.tui.trial_words import describe_plan, format_heading
 from study.workflows.trial.display import SignOfLife
@@ -101,7 +101,7 @@ def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
     answer = keys.parse_answer(line.text)
     if answer is not None:
         return Answered(answer, line.read_s)
-    return {"q": PARTICIPANT_LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
+    return {LEAVE: PARTICIPANT_LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
 
 
 def show_practice_result(result: PracticeResult, conversation: Conversation) -> None:

@@ -13,20 +13,18 @@ from textual.widget import Widget
 from study.session.watching.watch_view import StaircasePoint
 from study.tui.drawing.braille import Canvas
 from study.tui.drawing.staircase_drawing import (
+    AXIS_MARGIN_RATIO,
     LABEL_COLUMNS,
+    MAX_DOTS_PER_TRIAL,
+    MIN_AXIS_RATIO,
+    MIN_PLOT_COLUMNS,
+    MIN_ROWS,
     PEAK_MARK,
     RIGHT_MARK,
     VALLEY_MARK,
     WRONG_MARK,
     format_level,
 )
-
-MIN_AXIS_RATIO = 4.0
-"""Least ratio of the cap to the lower end of the level axis, so that small steps do not look large. Chosen, as in
-`staircase_drawing`."""
-MAX_DOTS_PER_TRIAL = 4.0
-"""Largest horizontal distance of successive trials, in braille dots; with many trials it is smaller. Chosen, as in
-`staircase_drawing`."""
 
 MUTED = "$foreground 65%"
 """Style of labels and legend."""
@@ -64,7 +62,7 @@ class LevelHistory(Widget):
 
     def render(self) -> Content:
         width, height = self.content_size.width, self.content_size.height
-        if width < LABEL_COLUMNS + 8 or height < 4:
+        if width < LABEL_COLUMNS + MIN_PLOT_COLUMNS or height < MIN_ROWS:
             return Content("No room for the staircase.")
         return draw_level_history(self._points, self._next_level_n, self._cap_n, (width, height))
 
@@ -73,11 +71,10 @@ def draw_level_history(
     points: Sequence[StaircasePoint], next_n: float | None, cap_n: float, size: tuple[int, int]
 ) -> Content:
     """Draw the staircase as text, with marks, labels of levels (N) and legend. points, next_n, cap_n: as in
-    `LevelHistory.show`. size: columns and rows in character cells, labels and legend included. The level axis ends at
-    least 15 % below the lowest level, so that its mark is not on the edge."""
+    `LevelHistory.show`. size: columns and rows in character cells, labels and legend included."""
     columns, rows = size[0] - LABEL_COLUMNS, size[1] - 1
     levels_n = [point.level_n for point in points] + ([next_n] if next_n is not None else [])
-    lowest_n = min([cap_n / MIN_AXIS_RATIO, *(0.85 * trial_level_n for trial_level_n in levels_n)])
+    lowest_n = min([cap_n / MIN_AXIS_RATIO, *(AXIS_MARGIN_RATIO * trial_level_n for trial_level_n in levels_n)])
     canvas = Canvas(columns, rows)
     dots_per_trial = min(MAX_DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(levels_n) - 1))
 
@@ -93,7 +90,7 @@ def draw_level_history(
         canvas.draw_line(start, end)
     marks_by_cell: dict[tuple[int, int], str] = {}
     for (x, y), mark in zip(points_in_dots, [*map(_choose_mark, points), NEXT_MARK], strict=False):
-        cell = (round(y) // 4, round(x) // 2)
+        cell = (round(y) // 4, round(x) // 2)  # a cell has 2 x 4 dots
         if cell not in marks_by_cell or _MARK_PRIORITY[mark] >= _MARK_PRIORITY[marks_by_cell[cell]]:
             marks_by_cell[cell] = mark
     level_labels = {0: cap_n, rows - 1: lowest_n}

@@ -17,7 +17,6 @@ STATUS_SYMBOLS: dict[SittingStatus, str] = {
 }
 """Symbol of each status of a session, a single character."""
 
-
 NOT_MEASURED_MARK = "n.m."
 """Text in place of an acceleration that was not measured, in the table of trials."""
 NOT_MEASURED_LEGEND = "answered too early, or see remark; counts"
@@ -61,9 +60,8 @@ def describe_activity(view: WatchView) -> str:
 
 def format_run_name(view: WatchView, run: WatchedRun) -> str:
     """Format the name of a run of the view: its phase, and its number in that phase from 1, such as "test 2"."""
-    return (
-        f"{run.phase} {1 + [other_run.run for other_run in view.runs if other_run.phase == run.phase].index(run.run)}"
-    )
+    runs_of_phase = [other_run.run for other_run in view.runs if other_run.phase == run.phase]
+    return f"{run.phase} {1 + runs_of_phase.index(run.run)}"
 
 
 def format_reversals(run: WatchedRun) -> str:

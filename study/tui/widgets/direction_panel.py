@@ -80,7 +80,8 @@ class DirectionPanel(Widget):
         drawing, left_margin = self._make_drawing()
         drawing_row = y - (drawing_height - len(drawing)) // 2
         row_text = drawing[drawing_row] if 0 <= drawing_row < len(drawing) else ""
-        digit_row = LARGE_DIGITS[self.number][y] if y < 3 and self.picture is not None else ""
+        digit = LARGE_DIGITS[self.number]
+        digit_row = digit[y] if y < len(digit) and self.picture is not None else ""
         text = f" {digit_row}".ljust(left_margin) + row_text
         return Strip([Segment(text.ljust(width)[:width], direction_style)], width)
 

@@ -12,6 +12,8 @@ from study.session.views.participant_views import Progress
 
 DONE_CHAR, REMAINING_CHAR = "━", "─"
 """Characters of the bar, for the part that is done and the part that remains."""
+MIN_BAR_WIDTH, MAX_BAR_WIDTH = 8, 40
+"""Characters of the shortest bar that shows progress, and of the longest (chosen: longer shows no more detail)."""
 
 
 class SessionBar(Widget):
@@ -32,12 +34,11 @@ class SessionBar(Widget):
         self._words = words
 
     def render_line(self, y: int) -> Strip:
-        """Draw the line. The heading is cut where the shortest bar, 8 characters, leaves too little room."""
+        """Draw the line. The bar has at most a quarter of the width. The heading is cut where the shortest bar leaves
+        too little room."""
         width = self.size.width
-        # The bar has up to 40 characters and a quarter of the width (chosen: longer shows no more detail). It shrinks
-        # to 8, the shortest bar that shows progress, before the heading is cut.
         available_bar_width = width - len(self.heading) - 1 - len(self._format_progress(0))
-        right_text = self._format_progress(max(8, min(40, width // 4, available_bar_width)))
+        right_text = self._format_progress(max(MIN_BAR_WIDTH, min(MAX_BAR_WIDTH, width // 4, available_bar_width)))
         left_text = self.heading[: max(0, width - len(right_text) - 1)]
         gap = " " * (width - len(left_text) - len(right_text))
         style = self.rich_style

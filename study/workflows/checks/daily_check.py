@@ -221,7 +221,7 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
             if changed_kinds
             else "measured too inaccurately to detect a change"
         )
-        return DeviceFinding("Daily check", f"{status_text} ({time_and_path})", False, advice, True)
+        return DeviceFinding("Daily check", f"{status_text} ({time_and_path})", False, advice, warning=True)
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 

@@ -21,6 +21,11 @@ FRICTION_ADVICE = "That may come from the friction: mend it first."
 """Advice where gain or response changed together with the friction."""
 NOISE_ADVICE = "It was measured too inaccurately: close other programs, keep the table still, and check again."
 """Advice where the measurement is too noisy to decide whether there was a change."""
+ORIENTATION_ADVICE = (
+    "More than 100 % may come from a reversed or exchanged axis of the sensor: first compare its mounting and its "
+    "table in the device's file with those at the acceptance."
+)
+"""Added where a response differs by more than itself, as one of reversed sign does (200 %)."""
 PERSISTENCE_ADVICE = "If it persists, name the cause with `hapteq diagnose`, or accept the device anew."
 """Added to each advice of `CAUSE_ADVICE`."""
 
@@ -44,6 +49,8 @@ def _make_finding(kind: str, changes: Sequence["Change"], friction_changed: bool
         if friction_changed and kind in ("gain", "response")
         else f"{CAUSE_ADVICE[kind]} {PERSISTENCE_ADVICE}"
     )
+    if kind == "response" and any(change.changed and change.today > 1 for change in changes):
+        cause_text = f"{ORIENTATION_ADVICE} {cause_text}"
     advice = f"It changed ({changed_axes_text}). {cause_text}"
     if changed_axes_text:
         return DeviceFinding(kind.capitalize(), change_text, fine=False, advice=advice)

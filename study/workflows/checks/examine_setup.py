@@ -11,7 +11,14 @@ from pathlib import Path
 
 from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
-from study.devices.opening import accept_device, examine_device, get_limit_test_force_n, needs_real_time, open_device
+from study.devices.opening import (
+    accept_device,
+    examine_device,
+    get_limit_test_force_n,
+    needs_real_time,
+    open_device,
+    require_testable_device,
+)
 from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
 from study.session.views.handle_notice import format_limit_test_notice
@@ -146,8 +153,8 @@ def accept_examined_device(
 ) -> str:
     """Record the baseline of the daily checks and the acceptance of the device for use with a hand, signed by
     `operator`; returns a sentence about it. Without a working accelerometer no baseline is recorded. Raises StudyError
-    for a simulated device, without a timing, with a wrong finding other than of `OPTIONAL_FINDINGS`, and where baseline
-    or acceptance fail."""
+    for a simulated device, without a timing, with a wrong finding other than of `OPTIONAL_FINDINGS`, for a driver that
+    cannot be tested, and where baseline or acceptance fail."""
     if not needs_real_time(device_name):
         raise WrongUseError("There is nothing to accept", f"{device_name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing
@@ -160,8 +167,9 @@ def accept_examined_device(
             "The device was not accepted", f"Not fine: {problem_names}.", "Mend that first, as said above."
         )
     has_sensor = examination.is_sensor_fine
+    settings = replace(_make_settings(device_name, 0.0), with_sensor=has_sensor)
+    require_testable_device(device_name, settings)  # before anything moves
     baseline = record_baseline(device_name, motion_callbacks) if has_sensor else ("", "")
     motion_callbacks.announce(format_limit_test_notice(device_name, get_limit_test_force_n()))
-    settings = replace(_make_settings(device_name, 0.0), with_sensor=has_sensor)
     sentence = accept_device(device_name, settings, RealClock(), operator, baseline)
     return sentence if has_sensor else f"{sentence}. Without an accelerometer no daily check will be possible."

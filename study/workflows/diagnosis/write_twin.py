@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from numpy.linalg import LinAlgError
+
 from analysis.wording import capitalise
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import (
@@ -21,7 +23,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitSettings,
 )
 from equalizer.identification.mechanical.rigid_body import RigidBody, fit_rigid_body, remove_friction_damping
-from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, MechanicalModelError, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
 from study.devices.opening import CALIBRATED_PREFIX, SIMULATED
@@ -136,7 +138,7 @@ def _fit_models(
     try:
         fit = fit_mechanical_model([stronger], settings, on_progress, plan.device)
         return fit, fit_rigid_body(fit, stronger, weaker, settings)
-    except MechanicalFitError as refusal:
+    except (MechanicalFitError, MechanicalModelError, LinAlgError) as refusal:
         raise StudyError(
             TITLE,
             f"{capitalise(str(refusal))}.",

@@ -225,11 +225,11 @@ def _make_settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[Floa
     return replace(settings, limits=replace(settings.limits, slew_n_per_s=slew_n_per_s))
 
 
-def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
+def _play_transient(device: Device, forces: FloatArray, on_progress: Callable[[float], None]) -> FloatArray:
     """Play forces (N, 3), N, and return the measured acceleration, (N, 3) in m/s^2, less its mean at rest before."""
     rest_rows = round(SETTLE_S * device.info.sample_rate_hz)
     padded_forces = np.pad(forces, ((rest_rows, rest_rows), (0, 0)))
-    acceleration = read_measured_acceleration(play_forces(device, padded_forces, on_share))
+    acceleration = read_measured_acceleration(play_forces(device, padded_forces, on_progress))
     return np.asarray(acceleration[rest_rows : rest_rows + len(forces)] - acceleration[:rest_rows].mean(axis=0))
 
 

@@ -74,18 +74,22 @@ class RepeatResult:
 
 
 def make_result(plan: RepeatPlan, state: IterationState, plays: list[PlaybackResult]) -> RepeatResult:
-    """Make the result after the last play, of at least one. A repetition that could have continued (its number of
-    corrections is used up) ends with the verdict BEST_KEPT."""
-    verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
+    """Make the result after the last play, of at least one."""
     return RepeatResult(
         forces=_make_force_table(plan, state),
         errors=state.errors,
         noise_floor=_compute_relative_noise_floor(state),
-        verdict=verdict,
+        verdict=_find_final_verdict(state),
         best_play=int(np.argmin(state.residuals)),
         remark=state.remark,
         plays=tuple(plays),
     )
+
+
+def _find_final_verdict(state: IterationState) -> Verdict:
+    """Find the verdict of a repetition that has ended: BEST_KEPT where it could have continued (its number of
+    corrections is used up)."""
+    return Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
 
 
 def _make_force_table(plan: RepeatPlan, state: IterationState) -> Trajectory:
@@ -107,7 +111,6 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
         return
     table = _make_force_table(plan, state)
     write_trajectory(plan.out, table)
-    verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
     repeats = Repeats(
         trajectory_sha256=hash_trajectory(plan.reference),
         model_sha256=plan.model_sha256,
@@ -120,7 +123,7 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
         noise_floor=_compute_relative_noise_floor(state),
         gains=state.gains,
         fitted=state.scales,
-        verdict=verdict.name.lower(),
+        verdict=_find_final_verdict(state).name.lower(),
         remark=state.remark,
         interrupted=interrupted,
     )

@@ -34,7 +34,7 @@ from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import REQUEST_CLASSES, REQUEST_FORMAT, REQUEST_VERSION
 from study.workflows.files import formats_text
-from study.workflows.files.importing_docs import compose_importing_page
+from study.workflows.files.importing_docs import compose_importing_page, format_markdown_table
 
 
 def make_event_schema() -> dict[str, Any]:
@@ -45,12 +45,6 @@ def make_event_schema() -> dict[str, Any]:
         if "event" in event.get("properties", {}):
             event["properties"]["chain"] = {"type": "string", "pattern": f"^[0-9a-f]{{{log_chain.CHECKSUM_DIGITS}}}$"}
     return schema
-
-
-def format_session_log() -> Iterable[str]:
-    """Yield heading and paragraphs of docs/formats.md on the session log and its seal."""
-    yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
-    yield from formats_text.SESSION_LOG_NOTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,20 +133,29 @@ def compose_formats_page() -> str:
     parts = [
         "# File formats",
         *formats_text.INTRODUCTION,
-        *_format_recordings(),
+        "## Recording (`.h5`)",
+        _format_layout(recording_layout.LAYOUT),
+        formats_text.SIGNAL_TABLE_NOTE,
+        _format_layout(recording_layout.SIGNAL_ATTRIBUTES),
+        formats_text.SEGMENT_TABLE_NOTE,
+        _format_layout(recording_layout.SEGMENT_FIELDS),
+        formats_text.RECORDING_NOTES,
         "## Identified model (`.h5`)",
         _format_layout(identified_model_file.LAYOUT),
         "## Calibration of a linkage (`.h5`)",
         CALIBRATION_ABOUT,
         _format_layout(CALIBRATION_LAYOUT),
-        *_format_mechanical_models(),
+        "## Mechanical model (`.toml`)",
+        formats_text.MECHANICAL_MODEL_NOTES,
+        _format_layout(mechanical_model_file.LAYOUT),
         "## Effects",
         formats_text.EFFECTS_NOTES,
         _format_effects(),
         "## Laws without a name",
         formats_text.LAW_SECTION,
         *_format_csv_tables(),
-        *format_session_log(),
+        "## Session log (`events.jsonl`) and its seal (`seal.json`)",
+        *formats_text.SESSION_LOG_NOTES,
         "## JSON documents and protocols",
         "\n".join(f"* [`{schema.file}`](schemas/{schema.file}): {schema.describes}" for schema in SCHEMAS),
     ]
@@ -173,24 +176,6 @@ def write_documents(folder: Path) -> None:
         write_text(folder / name, text, overwrite=True)
 
 
-def _format_recordings() -> Iterable[str]:
-    """Yield the section on the HDF5 file of a recording."""
-    yield "## Recording (`.h5`)"
-    yield _format_layout(recording_layout.LAYOUT)
-    yield formats_text.SIGNAL_TABLE_NOTE
-    yield _format_layout(recording_layout.SIGNAL_ATTRIBUTES)
-    yield formats_text.SEGMENT_TABLE_NOTE
-    yield _format_layout(recording_layout.SEGMENT_FIELDS)
-    yield formats_text.RECORDING_NOTES
-
-
-def _format_mechanical_models() -> Iterable[str]:
-    """Yield the section on the TOML file of a mechanical model."""
-    yield "## Mechanical model (`.toml`)"
-    yield formats_text.MECHANICAL_MODEL_NOTES
-    yield _format_layout(mechanical_model_file.LAYOUT)
-
-
 _RESPONSE_UNIT = "the response's unit"
 """Text for a unit that is that of the response, in the table of effects."""
 
@@ -208,7 +193,7 @@ def _format_effects() -> str:
         parameters_text = ", ".join(_format_parameter(parameter) for parameter in effect.parameters)
         rotational_units = ", ".join(parameter.find_unit(ROTATIONAL, _RESPONSE_UNIT) for parameter in effect.parameters)
         rows.append((f"`{effect.name}`", effect.place, parameters_text, rotational_units))
-    return _format_markdown_table(("effect", "place", "parameters", "rotational units"), rows)
+    return format_markdown_table(("effect", "place", "parameters", "rotational units"), rows)
 
 
 _CSV_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
@@ -221,7 +206,7 @@ _CSV_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
 def _format_csv_tables() -> Iterable[str]:
     """Yield the sections on the CSV tables: trajectories and forces, trials, thresholds."""
     yield "## Trajectory and forces (`.csv`)"
-    yield _format_markdown_table(
+    yield format_markdown_table(
         ("header", "holds"), [(f"`{','.join(kind.header)}`", f"{kind.quantity}, {kind.unit}") for kind in TABLE_KINDS]
     )
     yield formats_text.FORCE_TABLE_NOTES
@@ -229,7 +214,7 @@ def _format_csv_tables() -> Iterable[str]:
         yield f"## `{name}`"
         yield description
         type_hints = get_type_hints(row_type)
-        yield _format_markdown_table(
+        yield format_markdown_table(
             ("column", "holds"),
             [(f"`{column}`", describe_type(type_hints[column])) for column in list_columns(row_type)],
         )
@@ -240,14 +225,7 @@ def _format_layout(entries: Iterable[Entry]) -> str:
     rows = [
         (f"`{entry.name}`", entry.type_and_shape, entry.meaning, "yes" if entry.required else "no") for entry in entries
     ]
-    return _format_markdown_table(("name", "holds", "meaning", "required"), rows)
-
-
-def _format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """Format a Markdown table. header: a cell per column; rows: a tuple of cells each. The cells must not contain a
-    vertical bar, which would end them."""
-    table_rows = [header, tuple("---" for _ in header), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in table_rows)
+    return format_markdown_table(("name", "holds", "meaning", "required"), rows)
 
 
 if __name__ == "__main__":

@@ -89,7 +89,9 @@ TRIALS_NOTES = (
     "One row per presentation; further columns may follow. `felt` is false if a person answered while no device moved, "
     "and empty for simulated participants. `direction_shown` and `answer` are numbers on the screen; `angle_deg` is "
     "the direction. In the phase `detection` they are numbers of intervals. In the phase `catch` the level is the cap, "
-    "and the trial does not move a staircase."
+    "and the trial does not move a staircase. `run`, `trial` and `attempt` count from 0, as in the log and the names "
+    "of recordings, in all tables; `hapteq show` and `hapteq watch` count from 1, and the participant's screen counts "
+    "the runs of each phase from 1."
 )
 """Paragraph above the columns of `trials.csv`."""
 

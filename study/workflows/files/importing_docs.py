@@ -20,7 +20,7 @@ def compose_importing_page() -> str:
         f"```toml\n{importing_text.EXAMPLE}```",
         "## Expressions",
         *importing_text.EXPRESSIONS,
-        _format_markdown_table(
+        format_markdown_table(
             ("function", "gives"), ((f"`{function.usage}`", function.meaning) for function in FUNCTIONS.values())
         ),
         "## What is not read",
@@ -34,7 +34,7 @@ def compose_importing_page() -> str:
         ),
         "## Maps that come with hapteq",
         importing_text.SHIPPED_MAPS,
-        _format_markdown_table(("name", "files", "what"), (_format_map_row(name) for name in list_shipped_maps())),
+        format_markdown_table(("name", "files", "what"), (_format_map_row(name) for name in list_shipped_maps())),
     ]
     return "\n\n".join(sections) + "\n"
 
@@ -70,7 +70,7 @@ def _format_key_section(title: str, table: Node) -> str:
         )
         for key, node in plain_keys
     )
-    return f"### {title}\n\n{_format_markdown_table(('key', 'holds', 'meaning'), rows)}"
+    return f"### {title}\n\n{format_markdown_table(('key', 'holds', 'meaning'), rows)}"
 
 
 def _format_map_row(name: str) -> tuple[str, str, str]:
@@ -79,7 +79,7 @@ def _format_map_row(name: str) -> tuple[str, str, str]:
     return f"`{name}`", ", ".join(f"`{pattern}`" for pattern in import_map.files), import_map.title
 
 
-def _format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+def format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
     """Format a Markdown table. A bar within a cell would end the cell; it is replaced by a slash."""
     rows_with_header = [header, tuple("---" for _ in header), *rows]
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |" for cells in rows_with_header)

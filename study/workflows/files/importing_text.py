@@ -95,7 +95,7 @@ page.
 
 ```
 hapteq import run1.npz run2.npz --map MAP.toml --out rec.h5    # any arrays, by a map
-hapteq import run1.csv --out rec.h5                            # header with units: time [s],fx [N]; t_s, force_N, x_mm
+hapteq import run1.csv --out rec.h5                            # header with units: time [s],fx [N]; t_s,force_N,pos_mm
 hapteq import data.mat --out rec.h5 > MAP.toml                 # unclear names: prints a map of this file, to complete
 hapteq import FOLDER --out rec.h5                              # its map, a shipped map, or numbered tables by header
 ```
@@ -253,7 +253,8 @@ NOT_READ = (
     f"the bytes on disk, at most {MAX_LIMIT_BYTES // 2**30} GiB (an hour of nine channels at 10 kHz is 2.6 GB). If a "
     "file is refused for this reason, compress it less or cut the recording. Tables may have "
     f"{MAX_TABLE_BYTES // 2**20} MiB and {MAX_ROWS:.0e} rows.\n"
-    "* **HDF5.** No external storage, no virtual datasets, no links to other files.\n"
+    "* **HDF5.** No external storage, no virtual datasets, no links to other files. The attributes `scale_factor` and "
+    "`add_offset` of netCDF are not applied, which is reported; the map's `value` can state them.\n"
     "* **NPY and NPZ.** Versions 1.0 and 2.0, stored or deflated; no Python objects.\n"
     "* **MAT.** Versions 5 to 7.3 (Matlab's -v6, -v7, -v7.3). Texts, sparse matrices, objects (timeseries, tables) and "
     "cells of unlike arrays (in -v7.3 all cells) are left out. The import names them, and the Matlab command to use "

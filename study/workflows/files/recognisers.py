@@ -33,6 +33,7 @@ from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.participant_texts import load_in_language, read_language
+from study.store.formats.protocol_files import find_locked_words
 from study.store.formats.real_answer_file import read_real_answer
 from study.store.formats.recording_file import read_recording
 from study.store.formats.repeats_file import FORMAT as REPEATS_FORMAT
@@ -147,8 +148,9 @@ def recognise_protocol(content: FileContent) -> str | None:
     """Recognise a study or recording protocol in TOML by any of its top-level keys."""
     if not (content.toml or {}).keys() & _PROTOCOL_KEYS:
         return None
+    text, folder = content.text or "", content.path.parent
     try:
-        protocol, _ = load_in_language(content.text or "", content.path.name, content.path.parent)
+        protocol, _ = load_in_language(text, content.path.name, folder, find_locked_words(text, (folder,)))
     except ProtocolError as error:
         raise UnusableFileError(content.path, "protocol", tuple(str(problem) for problem in error.problems)) from error
     kind = "recording" if isinstance(protocol, RecordingProtocol) else "study"

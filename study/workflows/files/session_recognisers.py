@@ -70,6 +70,7 @@ DOCUMENT_KINDS = {
     # Of results: their modules load slowly, or may not be imported here.
     "hapteq-acceptance": DocumentKind("acceptance of a device", 1, ("device", "details", "operator", "accepted_on")),
     "hapteq-contact": DocumentKind("played contact", 1, ("normal", "band_hz", "measured_error", "model_sha256")),
+    "hapteq-export": DocumentKind("facts of exported trials", 1, ("versions", "protocol_hash", "seeds")),
     "hapteq-power": DocumentKind("power of a study", 1, ("plan", "judged_hz", "points")),
     "hapteq-bank": DocumentKind("settings of a blind test", 1, ("seed", "brief")),
     "hapteq-proof": DocumentKind("blind test of the diagnosis", 1, ("provenance",)),

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from analysis.psychophysics.power.power_curve import (
     PowerPoint,
-    Share,
     StudyVerdict,
     compute_true_difference_db,
     find_judged_pair,
@@ -234,14 +233,11 @@ def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVER
     ]
     for point in points:
         shares = (point.primary, point.means, point.published, point.coverage)
-        share_texts = [_format_percent(share) for share in shares]
+        share_texts = [
+            f"{100 * share.value:.1f} % ({100 * share.lower:.1f} to {100 * share.upper:.1f})" for share in shares
+        ]
         lines.append(
             f"{point.people:6}  {share_texts[0]:>26}  {share_texts[1]:>{paired_width}}  {share_texts[2]:>24}  "
             f"{share_texts[3]:>22}  {point.primary_bias_db:+.2f}, {point.means_bias_db:+.2f}"
         )
     return lines
-
-
-def _format_percent(share: Share) -> str:
-    """Format a share and its 95 % interval in percent."""
-    return f"{100 * share.value:.1f} % ({100 * share.lower:.1f} to {100 * share.upper:.1f})"

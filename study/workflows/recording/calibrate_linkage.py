@@ -83,8 +83,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
         raise WrongUseError(
             "There is no such grid",
             f"--radius is {plan.radius_m:g} m and --depth {plan.depth_m:g} m; each must be above "
-            f"{DIFFERENCE_STEP_M:g} m and at "
-            f"most {MAX_GRID_SIZE_M:g} m.",
+            f"{DIFFERENCE_STEP_M:g} m and at most {MAX_GRID_SIZE_M:g} m.",
             "Correct --radius or --depth.",
             saved=NOTHING_DONE,
         )

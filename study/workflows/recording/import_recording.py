@@ -6,6 +6,7 @@ states files, map and notes, so that its origin can be traced. `read_foreign` im
 """
 
 import hashlib
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -118,14 +119,31 @@ def read_foreign(
             "Give files, or a folder of them.",
             saved=NOTHING_WRITTEN,
         )
-    if map_name is not None:
-        map_file = read_map(map_name)
-        return _import_by_map(map_file, _expand_folders(files, map_file.map), on_progress)
+    map_file = None if map_name is None else read_map(map_name)
+    files = files if map_file is None else _expand_folders(files, map_file.map)
+    _require_distinct(files)
+    if map_file is not None:
+        return _import_by_map(map_file, files, on_progress)
     if len(files) == 1 and files[0].is_dir():
         return _import_by_found_map(files[0], on_progress)
     if all(is_hdf5(path) and read_format(path) == FORMAT for path in files):
         return _read_hapteq_recordings(files)
     return _import_by_header(files, on_progress)
+
+
+def _require_distinct(files: Sequence[Path]) -> None:
+    """Raise WrongUseError where a file is given twice: its samples would count twice."""
+    seen: set[str] = set()
+    for path in files:
+        real_path = os.path.realpath(path)  # Path.resolve raises RuntimeError for a link to itself
+        if real_path in seen:
+            raise WrongUseError(
+                "A file is given twice",
+                f"{path} is there more than once, and would count as two recordings.",
+                "Give each file once.",
+                saved=NOTHING_WRITTEN,
+            )
+        seen.add(real_path)
 
 
 def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path, ...]:

@@ -67,9 +67,14 @@ def list_recording_facts(overview: Overview) -> tuple[str, ...]:
     lines += [
         f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in meta.items() if key not in omitted_keys
     ]
-    import_metadata = meta.get("import")
-    notes = import_metadata.get("notes", ()) if isinstance(import_metadata, dict) else ()
-    return (*lines, *(f"import: {note}" for note in notes))
+    return (*lines, *(f"import: {note}" for note in list_import_notes(overview)))
+
+
+def list_import_notes(overview: Overview) -> tuple[str, ...]:
+    """List the remarks of the import of a recording, as sentences; empty for one that was not imported."""
+    import_metadata = overview.recording.meta.get("import")
+    notes = import_metadata.get("notes") if isinstance(import_metadata, dict) else None
+    return tuple(map(str, notes)) if isinstance(notes, list | tuple) else ()
 
 
 def make_look_document(overviews: Sequence[Overview]) -> list[dict[str, Any]]:

@@ -5,24 +5,26 @@ fails, the pieces that are complete are written.
 """
 
 import contextlib
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from equalizer.signals.joining import join_recordings
+from equalizer.signals.recording import Recording
 from protocols.definition.new_use import NOMINAL_RATE_HZ
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.hashing import hash_protocol
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
-from study.errors import DeviceError, UserInterruptError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.stimulus.limits import make_recording_limits
 from study.session.stimulus.recording_pieces import RecordingPiece, make_pieces
 from study.session.views.handle_notice import BeforeMoving, format_recording_notice, refuse_unannounced
 from study.store.disk.atomic_write import reserve_space
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording
 from study.workflows.ignored_interrupts import ignore_interrupts
@@ -74,8 +76,10 @@ def record_device(
     an exception from it keeps the device still. The default refuses every real device.
 
     Raises StudyError before anything moves if `out` exists already, has no folder, or no space is left for it: that is
-    reserved until the file is written. Raises UserInterruptError after KeyboardInterrupt, and DeviceError if the device
-    fails or may still exert a force after the interruption; the complete pieces are written before.
+    reserved until the file is written. Raises AlreadyExistsError if a file of that name was made while the device
+    moved; the recording is then written beside it. Raises UserInterruptError after KeyboardInterrupt, and DeviceError
+    if the device fails or may still exert a force after the interruption; the complete pieces are written before, and
+    an error of the writing is in `saved`.
     """
     require_new_output(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -99,13 +103,12 @@ def record_on_device(
                 before_moving(format_recording_notice(plan.protocol, device.info.name, plan.total_s))
             play_pieces(plan.protocol, pieces, device, takes, on_progress)
     except KeyboardInterrupt as interruption:
-        _write_complete_takes(plan, device, takes)
+        saved = _write_complete_takes(plan, device, takes)
         if device.fault() is Fault.FORCE_LEFT:  # more important to say than the interruption
-            raise _make_force_left_error(plan, len(takes)) from interruption
-        raise _make_interrupted_error(plan, len(takes)) from interruption
+            raise _make_force_left_error(saved) from interruption
+        raise _make_interrupted_error(plan, len(takes), saved) from interruption
     except DeviceError as error:
-        _write_complete_takes(plan, device, takes)
-        error.saved = _describe_saved(plan, len(takes))
+        error.saved = _write_complete_takes(plan, device, takes)
         raise
     return _write_takes(plan, device, takes, interrupted=False)
 
@@ -130,36 +133,33 @@ def require_new_output(out_path: Path) -> None:
     require_new_outputs(out_path, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
-def _make_interrupted_error(plan: RecordingPlan, take_count: int) -> UserInterruptError:
-    """Make the error after an interruption with the force released. take_count: number of complete pieces."""
+def _make_interrupted_error(plan: RecordingPlan, take_count: int, saved: str) -> UserInterruptError:
+    """Make the error after an interruption with the force released. take_count: number of complete pieces; saved:
+    sentence on them."""
     piece_count = len(make_pieces(plan.protocol, NOMINAL_RATE_HZ))
     return UserInterruptError(
         "Interrupted",
         f"{take_count} of {piece_count} pieces were recorded; the force was released.",
         "Record again under another name for the whole protocol.",
-        saved=_describe_saved(plan, take_count),
+        saved=saved,
     )
 
 
-def _make_force_left_error(plan: RecordingPlan, take_count: int) -> DeviceError:
-    """Make the error where the device may still exert a force. take_count: number of complete pieces."""
-    return DeviceError(
-        "The force may still be on",
-        Fault.FORCE_LEFT.sentence,
-        "Then record again.",
-        saved=_describe_saved(plan, take_count),
-    )
+def _make_force_left_error(saved: str) -> DeviceError:
+    """Make the error where the device may still exert a force. saved: sentence on the complete pieces."""
+    return DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=saved)
 
 
-def _describe_saved(plan: RecordingPlan, take_count: int) -> str:
-    """Describe, in a sentence, what was written. take_count: number of complete pieces."""
-    return f"The {take_count} whole pieces are in {plan.out}." if take_count else "Nothing was written."
-
-
-def _write_complete_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake]) -> None:
-    """Write the complete pieces of an interrupted recording, if there are any."""
-    if takes:
+def _write_complete_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake]) -> str:
+    """Write the complete pieces of an interrupted recording, if there are any. Returns a sentence on what was written;
+    an error of the writing is part of it, so that it does not hide why the recording ended."""
+    if not takes:
+        return "Nothing was written."
+    try:
         _write_takes(plan, device, takes, interrupted=True)
+    except StudyError as error:
+        return f"{error.title}. {error.happened} {error.saved}".rstrip()
+    return f"The {len(takes)} whole pieces are in {plan.out}."
 
 
 def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
@@ -178,8 +178,24 @@ def _write_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake],
     """Join the pieces into one recording with a segment each, and write it."""
     with ignore_interrupts():
         piece_recordings = [replace(take.recording, segments=(take.piece.segment,)) for take in takes]
-        write_recording(plan.out, join_recordings(piece_recordings, _make_metadata(plan, device, takes, interrupted)))
+        recording = join_recordings(piece_recordings, _make_metadata(plan, device, takes, interrupted))
+        _write_or_keep(plan.out, recording)
     return WrittenRecording(plan.out, tuple(warning for take in takes for warning in list_warnings(take)))
+
+
+def _write_or_keep(path: Path, recording: Recording) -> None:
+    """Write the recording. Where a file of this name was made while the device moved, write it beside that file, under
+    a free name, and raise AlreadyExistsError, which states it."""
+    try:
+        write_recording(path, recording)
+    except AlreadyExistsError as error:
+        for number in itertools.count(2):
+            free_path = path.with_stem(f"{path.stem}_{number}")
+            with contextlib.suppress(AlreadyExistsError):
+                write_recording(free_path, recording)
+                break
+        error.saved, error.do_now = f"The file is as it was; the recording is in {free_path}.", "Go on with that file."
+        raise
 
 
 def _make_metadata(plan: RecordingPlan, device: Device, takes: list[RecordedTake], interrupted: bool) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import draw_study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids, read_sensor_frame
+from analysis.psychophysics.runs import InconsistentTrialsError
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, make_anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import describe_declared
@@ -50,7 +51,7 @@ def analyze_data(
     collected_trials = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
         analysis = analyse_study(collected_trials.trials, collected_trials.protocol, collected_trials.exclusions)
-    except ValueError as error:
+    except InconsistentTrialsError as error:
         raise StudyError(
             "The data contradict their protocol", f"{error}.", "Nothing was written; look at the sessions named."
         ) from error

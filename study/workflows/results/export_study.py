@@ -35,6 +35,8 @@ from study.store.sessions.archive import SessionFolder, require_consent
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.results.collected_trials import CollectedTrials
 
+FORMAT, VERSION = "hapteq-export", 1
+"""Name and version of the format of the metadata; datasets of an earlier hapteq state none."""
 MAX_LEFT_OUT = 10_000
 """Largest plausible number of excluded items in a dataset; a larger one is ignored as an error of editing. Chosen."""
 EXPORT_AGAIN = "Export the study again, or restore the file from a copy."
@@ -86,6 +88,8 @@ def _gather_metadata(collected: CollectedTrials) -> dict[str, Any]:
     exclusions, and quality of the models."""
     names = [folder.name for folder in collected.sessions]
     return {
+        "format": FORMAT,
+        "version": VERSION,
         **gather_provenance(protocol_hash=collected.protocol_hash).as_dict(),
         "protocol_hash": collected.protocol_hash,
         "seeds": dict(zip(names, collected.seeds, strict=True)),
@@ -128,6 +132,13 @@ def _read_qualities(metadata: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     return tuple((str(row[0]), str(row[1])) for row in rows if isinstance(row, list) and len(row) == 2)
 
 
+def _require_version(metadata: Mapping[str, Any], path: Path, kind: str) -> None:
+    """Raise UnusableFileError for metadata of another version, such as of a newer hapteq."""
+    if (version := metadata.get("version", VERSION)) != VERSION:
+        reason = f"its version is {version}; this program reads version {VERSION}"
+        raise UnusableFileError(path, kind, (reason,), "Use the hapteq that exported it, or a newer one.")
+
+
 def _read_seeds(metadata: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
     """Read the seeds by session; empty where the metadata state none. Raises UnusableFileError for values that are no
     seeds."""
@@ -160,6 +171,7 @@ def collect_exported(folder: Path) -> CollectedTrials:
         KIND if has_psych_ds else tidy_csv.KIND,
     )
     metadata_path = folder / (DESCRIPTION_NAME if has_psych_ds else tidy_csv.FACTS_NAME)
+    _require_version(dataset.facts, metadata_path, kind)
     try:
         protocol = load_protocol(dataset.protocol_text, path.name)
     except ProtocolError as error:

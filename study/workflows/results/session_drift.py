@@ -136,7 +136,8 @@ class DriftReader:
 
 def describe_drift(drift: Drift) -> str:
     """Describe a drift with its unit and time, such as "friction along x 0.12 -> 0.20 N at minute 14"; friction with
-    its first and present value where these are known, otherwise with the change."""
+    its first and present value where these are known, otherwise with the change. A gain that fell by more than 100 %
+    has changed its sign."""
     minute_text = f"at minute {drift.time_s / 60:.0f}"
     axis_text = f" along {drift.axis}" if drift.axis else ""
     rivals_text = f" (or {' or '.join(drift.rivals)}: the probes cannot distinguish them)" if drift.rivals else ""
@@ -146,7 +147,8 @@ def describe_drift(drift: Drift) -> str:
             f"{minute_text}{rivals_text}"
         )
     if drift.parameter == "gain":
-        return f"gain{axis_text} {100 * drift.change:+.0f} % {minute_text}{rivals_text}"
+        sign_text = " (reversed sign: of the force, or of this axis of the accelerometer)" if drift.change < -1 else ""
+        return f"gain{axis_text} {100 * drift.change:+.0f} %{sign_text} {minute_text}{rivals_text}"
     if drift.parameter == "delay":
         return f"delay {1000 * drift.change:+.2f} ms {minute_text}{rivals_text}"
     quantity = "friction" if drift.parameter == "friction" else f"grip: {drift.parameter}"

@@ -27,11 +27,7 @@ from study.workflows.session.equalize_stimuli import (
     load_equalizer,
     reload_equalizer,
 )
-from study.workflows.session.open_session import (
-    OpenedSession,
-    SessionPlan,
-    open_session,
-)
+from study.workflows.session.open_session import OpenedSession, SessionPlan, open_session
 from study.workflows.session.resume_session import resume_session
 from study.workflows.session.run_session import run_session
 from study.workflows.trial.display import Display, Hand
@@ -47,13 +43,12 @@ from study.workflows.trial.sitting import (
     send_no_pulse,
 )
 
+RATE_TOLERANCE = 1e-3
+"""Share by which a device may be slower than a stimulus needs: a recorded rate is that of a clock. Chosen."""
+
 
 def _ignore_opened_session(folder: SessionFolder, device: Device) -> None:
     """Do nothing: default of `Participant.on_session_opened`."""
-
-
-RATE_TOLERANCE = 1e-3
-"""Share by which a device may be slower than a stimulus needs: a recorded rate is that of a clock. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)

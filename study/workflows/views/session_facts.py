@@ -26,7 +26,7 @@ def list_session_facts(folded_session: FoldedSession, zone: Zone) -> tuple[tuple
         ("title", state.protocol.title),
         ("device", _describe_device(session_opened)),
         ("equalizer", session_opened.equalizer),
-        ("its quality", _describe_quality(session_opened)),
+        ("its quality", "" if session_opened.equalized is None else session_opened.equalized.quality or NOT_STORED),
         ("within reach", _format_reachable_levels(session_opened)),
         ("begun", format_time_in_zone(session_opened.utc, zone, "seconds")),
         (_name_end_time(state), format_time_in_zone(_find_last_utc(folded_session), zone, "seconds") + time_remark),
@@ -54,11 +54,6 @@ def _describe_number(state: SessionState) -> str:
     if not state.has_final_place:
         return "without a place in the order of this protocol"
     return f"number {state.opened.participant_number + 1} of this protocol"
-
-
-def _describe_quality(session_opened: SessionOpened) -> str:
-    """Describe the quality of the model that equalizes the stimuli; empty without an equalizer."""
-    return "" if session_opened.equalized is None else session_opened.equalized.quality or NOT_STORED
 
 
 def _format_reachable_levels(session_opened: SessionOpened) -> str:

@@ -118,8 +118,8 @@ def _make_cached_line(folder: SessionFolder, file_stamps: tuple[tuple[str, int, 
         isinstance(session_opened, SessionOpened)
         and session_opened.session == folder.name
         and is_sealed(folder.path, content)
+        and MEASURED_EVENT in content  # not so where the participant was excluded before any trial
     )
-    is_trusted = is_trusted and MEASURED_EVENT in content  # not so where the participant was excluded before any trial
     name_and_run_count = (
         _read_name_and_run_count(session_opened.protocol_text)
         if is_trusted and isinstance(session_opened, SessionOpened)

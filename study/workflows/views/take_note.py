@@ -4,8 +4,6 @@ A log has a single writer. While a session runs, its program is that writer, and
 otherwise the note is appended directly, with the session's lock held.
 """
 
-from itertools import chain
-
 from study.devices.clock import Clock
 from study.errors import StudyError
 from study.session.facts.events import NoteTaken
@@ -63,11 +61,11 @@ def _append_notes(folder: SessionFolder, notes: tuple[NoteAsked, ...], clock: Cl
             log_contents = folded_session.log_contents
             if log_contents.torn:
                 remove_incomplete_line(folder.log, log_contents)
-                log.append(_make_program_note(f"a torn last line was cut off: {log_contents.torn}", clock))
+                cut_text = f"a torn last line was cut off: {log_contents.torn}"
+                log.append(NoteTaken(utc=clock.utc(), who="program", text=cut_text))
             inbox = RequestInbox(folder.path)
             inbox.clear()
-            waiting_requests = chain.from_iterable(iter(inbox.take, ()))  # a call takes a limited number
-            waiting_notes = [request for request in waiting_requests if isinstance(request, NoteAsked)]
+            waiting_notes = [request for request in inbox.take(max_files=None) if isinstance(request, NoteAsked)]
             for note in (*waiting_notes, *notes):
                 log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
                 inbox.forget_logged(note)
@@ -75,8 +73,3 @@ def _append_notes(folder: SessionFolder, notes: tuple[NoteAsked, ...], clock: Cl
                 seal_log(folder.log)
         finally:
             log.close()
-
-
-def _make_program_note(text: str, clock: Clock) -> NoteTaken:
-    """Make a note of the program."""
-    return NoteTaken(utc=clock.utc(), who="program", text=text)

@@ -25,18 +25,19 @@ from study.workflows.views.session_line import make_session_line
 def list_protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
     """List the study protocols to choose from: shipped ones first, then files in the data folder and in its parent
     folder."""
-    folders = dict.fromkeys((data.absolute(), data.absolute().parent))
-    study_files = [str(path) for folder in folders for path in _list_toml_files(folder) if _is_study_protocol(path)]
+    study_files = [str(path) for path in _list_files(data, "*.toml") if _is_study_protocol(path)]
     lines = (make_protocol_line(name, data) for name in (*list_shipped_protocols(), *study_files))
     return tuple(line for line in lines if line is not None)
 
 
-def _list_toml_files(folder: Path) -> list[Path]:
-    """List the TOML files in a folder, by name; empty if it cannot be read."""
-    try:
-        return sorted(path for path in folder.glob("*.toml") if path.is_file())
-    except OSError:
-        return []
+def _list_files(data: Path, pattern: str) -> list[Path]:
+    """List the files of a pattern in the data folder, then in its parent folder, each by name; none where a folder
+    cannot be read."""
+    paths: list[Path] = []
+    for folder in dict.fromkeys((data.absolute(), data.absolute().parent)):
+        with suppress(OSError):
+            paths += sorted(path for path in folder.glob(pattern) if path.is_file())
+    return paths
 
 
 def _is_study_protocol(path: Path) -> bool:
@@ -64,11 +65,8 @@ def make_protocol_line(name: str, data: Path) -> ProtocolLine | None:
 
 def list_model_files(data: Path) -> tuple[str, ...]:
     """List the files of identified models in the data folder and in its parent folder, the latest first."""
-    folders = dict.fromkeys((data.absolute(), data.absolute().parent))
-    hdf5_files = [path for folder in folders for path in _list_hdf5_files(folder)]
-    return tuple(
-        str(path) for path in sorted(hdf5_files, key=_read_mtime_s, reverse=True) if _is_identified_model(path)
-    )
+    latest_first = sorted(_list_files(data, "*.h5"), key=_read_mtime_s, reverse=True)
+    return tuple(str(path) for path in latest_first if _is_identified_model(path))
 
 
 def describe_model_quality(path: str) -> str:
@@ -77,14 +75,6 @@ def describe_model_quality(path: str) -> str:
         return write_quality_brief(read_identified_model(Path(path)).quality)
     except StudyError as problem:
         return f"cannot be used: {problem.title}"
-
-
-def _list_hdf5_files(folder: Path) -> list[Path]:
-    """List the HDF5 files in a folder; empty if it cannot be read."""
-    try:
-        return [path for path in folder.glob("*.h5") if path.is_file()]
-    except OSError:
-        return []
 
 
 def _read_mtime_s(path: Path) -> float:

@@ -119,11 +119,12 @@ def _make_minimal_view(
 def _analyse_session(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
     """Analyse this session alone. Returns the analysis and no sentence, or None and a sentence on why there is none."""
     # Imported here: statistics load slowly, and programs that import this module must start at once.
+    from analysis.psychophysics.runs import InconsistentTrialsError
     from analysis.psychophysics.study_analysis import analyse_study
 
     try:
         return analyse_study(state.trials, state.protocol), ()
-    except ValueError as error:
+    except InconsistentTrialsError as error:
         return None, (f"No thresholds: {error}.",)
 
 
@@ -174,10 +175,9 @@ def _make_staircase(state: SessionState, run: Run, threshold: Threshold | None) 
         for presented_trial in state.trials
         if presented_trial.run == run.index and presented_trial.is_valid and presented_trial.phase is not Phase.CATCH
     ]
-    is_complete = run.index < state.run
+    ending = "" if run.index < state.run else ", not complete"
     return Staircase(
-        title=f"Run {run.index + 1}: {run.frequency_hz:g} Hz, {run.phase.value}"
-        f"{'' if is_complete else ', not complete'}",
+        title=f"Run {run.index + 1}: {run.frequency_hz:g} Hz, {run.phase.value}{ending}",
         levels_n=tuple(trial.staircase_n for trial in counted_trials),
         correct=tuple(bool(trial.correct) for trial in counted_trials),
         reversals=tuple(trial.reversal for trial in counted_trials),

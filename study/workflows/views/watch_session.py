@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 LOCK_CHECK_INTERVAL_S = 1.0
 """Shortest interval (s) between checks of the log's lock, for a session whose live state is out of date. Chosen."""
+_INVALID_FIRST_LINE = "The first line of the log of {} is none that this version knows."
+"""Message for a log with an invalid first line; the placeholder is the session's name."""
 
 
 def follow(folder: Path) -> "Follower":
@@ -160,10 +162,6 @@ class Follower:
             self._lock_checked_utc = now_utc
             self._log_has_writer = is_log_locked(self._folder.log)
         return self._log_has_writer
-
-
-_INVALID_FIRST_LINE = "The first line of the log of {} is none that this version knows."
-"""Message for a log with an invalid first line; the placeholder is the session's name."""
 
 
 def _make_unfollowable_error(problem: str) -> StudyError:

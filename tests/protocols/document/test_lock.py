@@ -56,6 +56,7 @@ def test_a_lock_survives_its_file_and_says_what_it_is(lock):
         ({"version": 2}, "the lock is of version 2, and this hapteq reads version 1"),
         ({"hash": None}, "the lock lacks the text hash"),
         ({"name": 3, "locked_utc": None}, "the lock lacks the text name, locked_utc"),
+        ({"words": {"rest_title": 1}}, "the lock's words are no texts by key"),
     ],
 )
 def test_a_wrong_document_is_told_why(lock, change, problem):

@@ -136,13 +136,9 @@ def test_six_right_answers_make_two_steps(published):
     assert levels_db(published, "1111111")[-1] == pytest.approx(-8.0)
 
 
-def test_the_first_movement_is_no_reversal(published):
-    assert states(published, "0")[-1].reversals == 0
-    assert states(published, "111")[-1].reversals == 0
-
-
-def test_alternating_answers_are_no_reversals(published):
-    assert states(published, "1010")[-1].reversals == 0
+@pytest.mark.parametrize("answers", ["0", "111", "1010"])
+def test_neither_the_first_movement_nor_alternating_answers_are_reversals(published, answers):
+    assert states(published, answers)[-1].reversals == 0
 
 
 def test_a_push_against_the_cap_is_counted_and_turns_nothing(published):

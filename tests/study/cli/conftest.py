@@ -22,13 +22,14 @@ def run(capsys):
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory, small_text):
+def finished(tmp_path_factory, small_text, sketching):
     """A data folder with one finished session of the small protocol; copied by each test that changes it."""
     folder = tmp_path_factory.mktemp("finished")
     (folder / "small.toml").write_text(small_text)
     data = folder / "data"
-    assert main(["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", "3",
-                 "--subject", "P01", "--data", str(data)]) == 0  # fmt: skip
+    with sketching():
+        assert main(["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", "3",
+                     "--subject", "P01", "--data", str(data)]) == 0  # fmt: skip
     return data
 
 

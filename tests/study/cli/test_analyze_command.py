@@ -54,6 +54,7 @@ def test_a_damaged_session_is_left_out_and_named(run, data):
     assert "25 Hz" in out
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_changed_protocol_that_kept_its_name_is_chosen_by_its_hash(run, data, small_text, tmp_path):
     changed = tmp_path / "small.toml"
     changed.write_text(re.sub(r'(?m)^title = ".*"$', 'title = "Changed"', small_text))

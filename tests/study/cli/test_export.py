@@ -4,7 +4,9 @@ import csv
 import json
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -21,20 +23,41 @@ from study.store.formats.trials_file import read_trials
 from study.store.formats.trials_mat import write_trials_mat
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.export_study import collect_exported, export_study
+from tests.slow_instances import slow
 
 FLOAT = re.compile(r"\d+\.\d+")
 PSYCH_DS_FILE = re.compile(r"[a-z]+-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*_data\.csv")
 
 
 @pytest.fixture(scope="module")
-def data(tmp_path_factory, small_text) -> Path:
+def data(tmp_path_factory, small_text, sketching) -> Path:
     """Two sessions of the small protocol."""
     folder = tmp_path_factory.mktemp("export")
     (folder / "small.toml").write_text(small_text)
-    for number in (1, 2):
-        assert main(["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", str(number),
-                     "--subject", f"P0{number}", "--data", str(folder / "data")]) == 0  # fmt: skip
+    with sketching():
+        for number in (1, 2):
+            asked = ["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", str(number)]
+            assert main([*asked, "--subject", f"P0{number}", "--data", str(folder / "data")]) == 0
     return folder / "data"
+
+
+@pytest.fixture(scope="module")
+def export_as(data, tmp_path_factory) -> Callable[[str], Path]:
+    """Folder of the exported data; made once for each form."""
+
+    @cache
+    def export(form: str) -> Path:
+        out = tmp_path_factory.mktemp("exported") / form
+        assert main(["export", str(data), "--out", str(out), "--format", form]) == 0
+        return out
+
+    return export
+
+
+@pytest.fixture
+def exported(export_as, tmp_path) -> Callable[[str], Path]:
+    """A copy of it, to be changed."""
+    return lambda form: Path(shutil.copytree(export_as(form), tmp_path / "ds"))
 
 
 def logged(data: Path) -> list[Trial]:
@@ -77,7 +100,7 @@ def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, cap
 
 
 @pytest.mark.usefixtures("sketched")
-@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+@pytest.mark.parametrize("form", [*slow("psych-ds"), "csv"])
 def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(data, tmp_path, capsys, form):
     mine = tmp_path / "data"
     shutil.copytree(data, mine)
@@ -96,9 +119,8 @@ def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(d
 
 
 @pytest.mark.parametrize("count", ['"many"', "-1", "1e9", "10001"])
-def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
-    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", "csv"]) == 0
-    facts = tmp_path / "ds" / "facts.json"
+def test_a_count_that_is_none_is_not_believed(exported, tmp_path, count):
+    facts = exported("csv") / "facts.json"
     written = facts.read_text("utf-8")
     changed = written.replace('"left_out_count": 0', f'"left_out_count": {count}')
     assert changed != written
@@ -107,10 +129,9 @@ def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
 
 
 @pytest.mark.parametrize("form", ["psych-ds", "csv"])
-def test_a_declaration_that_was_changed_after_the_export_is_refused(data, tmp_path, capsys, form):
+def test_a_declaration_that_was_changed_after_the_export_is_refused(exported, tmp_path, capsys, form):
     """The facts beside it say whether it was locked before the data."""
-    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
-    (protocol,) = (tmp_path / "ds").rglob("protocol.toml")
+    (protocol,) = exported(form).rglob("protocol.toml")
     text = protocol.read_text("utf-8")
     protocol.write_text(f"# A comment changes nothing.\n{text}", "utf-8")
     assert collect_exported(tmp_path / "ds").lock_statement
@@ -127,12 +148,24 @@ def test_a_declaration_that_was_changed_after_the_export_is_refused(data, tmp_pa
     [("seeds", []), ("seeds", None), ("seeds", {"P01_001": "one"}), ("seeds", {"P01_001": None}),
      ("devices", None), ("devices", 5), ("devices", "omega"), ("observers", [None])],
 )  # fmt: skip
-def test_facts_of_another_kind_are_refused_in_words(data, tmp_path, key, value):
-    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", "csv"]) == 0
-    facts = tmp_path / "ds" / "facts.json"
+def test_facts_of_another_kind_are_refused_in_words(exported, tmp_path, key, value):
+    facts = exported("csv") / "facts.json"
     facts.write_text(json.dumps({**json.loads(facts.read_text("utf-8")), key: value}), "utf-8")
     with pytest.raises(UnusableFileError, match=rf"Its {key} are no "):
         collect_exported(tmp_path / "ds")
+
+
+def test_an_export_states_its_format_and_one_of_a_newer_version_is_refused(data, tmp_path):
+    """As docs/formats.md says of every JSON document; earlier exports state none, and are read."""
+    export_study(collect_sessions(data), data, tmp_path / "ds", "csv")
+    path = tmp_path / "ds" / "facts.json"
+    facts = json.loads(path.read_text("utf-8"))
+    assert (facts.pop("format"), facts.pop("version")) == ("hapteq-export", 1)
+    path.write_text(json.dumps({**facts, "version": 2}), "utf-8")
+    with pytest.raises(UnusableFileError, match="Its version is 2; this program reads version 1"):
+        collect_exported(tmp_path / "ds")
+    path.write_text(json.dumps(facts), "utf-8")
+    assert collect_exported(tmp_path / "ds").trials
 
 
 def test_every_fact_of_an_export_is_described(data, tmp_path):
@@ -167,11 +200,11 @@ def test_one_table_has_every_trial_and_a_dictionary_of_its_columns(data, tmp_pat
 @pytest.mark.parametrize(
     ("name", "text"), [("facts.json", "[]"), ("facts.json", "{"), ("trials.csv", "a,b\n1,2\n"), ("protocol.toml", "x")]
 )
-def test_a_damaged_table_is_refused_by_name(data, tmp_path, capsys, name, text):
-    assert main(["export", str(data), "--out", str(tmp_path / "csv"), "--format", "csv"]) == 0
-    (tmp_path / "csv" / name).write_text(text)
+def test_a_damaged_table_is_refused_by_name(exported, tmp_path, capsys, name, text):
+    folder = exported("csv")
+    (folder / name).write_text(text)
     capsys.readouterr()
-    assert main(["analyze", str(tmp_path / "csv"), "--out", str(tmp_path / "out")]) == 1
+    assert main(["analyze", str(folder), "--out", str(tmp_path / "out")]) == 1
     assert name in capsys.readouterr().err
 
 
@@ -215,9 +248,8 @@ def test_a_folder_that_holds_something_is_left_alone(data, tmp_path, form, capsy
 
 
 @pytest.mark.parametrize("spoil", ["{", '{"name": 1}', "[]"])
-def test_a_damaged_description_is_named(data, tmp_path, spoil, capsys):
-    assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
-    (tmp_path / "ds" / "dataset_description.json").write_text(spoil)
+def test_a_damaged_description_is_named(exported, tmp_path, spoil, capsys):
+    (exported("psych-ds") / "dataset_description.json").write_text(spoil)
     assert main(["analyze", str(tmp_path / "ds")]) != 0
     assert "dataset_description.json" in capsys.readouterr().err
 
@@ -243,10 +275,9 @@ def test_a_table_with_a_wrong_row_is_named(data, tmp_path, capsys):
         (lambda lines: lines[:1], "There is nothing to analyse"),
     ],
 )
-def test_rows_twice_numbers_that_are_none_and_no_rows_are_refused(data, tmp_path, capsys, form, spoil, said):
+def test_rows_twice_numbers_that_are_none_and_no_rows_are_refused(exported, tmp_path, capsys, form, spoil, said):
     """In any phase: what is no run of a staircase is not replayed, and would not contradict the protocol."""
-    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
-    for path in (tmp_path / "ds").rglob("*.csv"):
+    for path in exported(form).rglob("*.csv"):
         lines = path.read_text("utf-8").splitlines()
         if "level_n" in lines[0].split(",") and "session" in lines[0].split(","):
             path.write_text("\n".join(spoil(lines)) + "\n", "utf-8")

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
@@ -109,6 +110,26 @@ def test_show_on_a_recording_says_what_it_says_of_itself(written, capsys):
     assert "import: ax: 3 samples are missing." in said
     assert f"Its checks: hapteq look {written}" in said
     assert "clipping" not in said
+
+
+def test_what_was_assumed_of_a_file_of_others_is_said(tmp_path, capsys):
+    """Its import is in memory only: what `hapteq import` notes was said by no look."""
+    with h5py.File(tmp_path / "others.h5", "w") as file:
+        file["time [s]"] = np.arange(400) / 1000
+        file["\x1b[2Jforce [N]"], file["x [mm]"] = np.arange(400) % 7, np.arange(400) % 5
+        file["\x1b[2Jforce [N]"].attrs["scale_factor"] = 0.001
+    for command in (["look"], ["import", "--out", str(tmp_path / "r.h5")], ["look", "--json"]):
+        assert main([*command, str(tmp_path / "others.h5")]) == 0
+        said = capsys.readouterr().err
+        assert "Note: Taken from the header: " in said and "scale_factor = 0.001 was not applied" in said
+        assert "\x1b[2J" not in said
+
+
+@pytest.mark.parametrize("notes", [5, "text", None, [["nested"], 3]])
+def test_notes_of_an_import_that_are_none_end_no_look(lever, tmp_path, capsys, notes):
+    write_recording(tmp_path / "a.h5", replace(lever, meta={"import": {"notes": notes}}))
+    assert main(["look", str(tmp_path / "a.h5")]) == 0
+    assert capsys.readouterr().err.count("Note: ") == (2 if isinstance(notes, list) else 0)
 
 
 def test_names_in_a_file_do_not_move_the_cursor(lever, tmp_path, capsys):

@@ -75,6 +75,7 @@ SPOILED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spoil", "words"), SPOILED.values(), ids=SPOILED)
 def test_a_folder_that_is_not_what_it_was_is_named_and_nothing_is_scored(bank, run, spoil, words):
     spoil(bank)
@@ -92,6 +93,7 @@ def test_wrong_numbers_are_wrong_use(run, tmp_path, option, value):
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_with_other_files_and_another_seed_are_refused(bank, run, tmp_path):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "mine.txt").write_text("mine", encoding="utf-8")

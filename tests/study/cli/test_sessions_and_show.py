@@ -23,13 +23,9 @@ def run(capsys):
     return call
 
 
-@pytest.fixture(scope="module")
-def taken(tmp_path_factory, small_text) -> Path:
-    folder = tmp_path_factory.mktemp("taken")
-    (folder / "small.toml").write_text(small_text)
-    asked = ["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", "3"]
-    assert main([*asked, "--subject", "P01", "--data", str(folder / "data")]) == 0
-    return folder / "data"
+@pytest.fixture
+def taken(finished) -> Path:
+    return finished
 
 
 @pytest.mark.slow

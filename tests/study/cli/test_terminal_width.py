@@ -17,15 +17,16 @@ COMMANDS = {
 
 
 @pytest.fixture(scope="module")
-def data(tmp_path_factory, small_text):
+def data(tmp_path_factory, brief_text, sketching):
     """Two sessions, one of a protocol with a long name."""
     folder = tmp_path_factory.mktemp("width")
     long = "a_protocol_of_a_name_that_fills_a_line_of_sixty_three_characters"[:63]
     for code, name in (("P01", "small"), ("PARTICIPANT00002", long)):
-        text = "\n".join(f'name = "{name}"' if line.startswith("name = ") else line for line in small_text.splitlines())
+        text = "\n".join(f'name = "{name}"' if line.startswith("name = ") else line for line in brief_text.splitlines())
         (folder / f"{name}.toml").write_text(text)
-        assert main(["study", "--protocol", str(folder / f"{name}.toml"), "--observer", "ideal", "--seed", "3",
-                     "--subject", code, "--data", str(folder / "data")]) == 0  # fmt: skip
+        with sketching():
+            assert main(["study", "--protocol", str(folder / f"{name}.toml"), "--observer", "ideal", "--seed", "3",
+                         "--subject", code, "--data", str(folder / "data")]) == 0  # fmt: skip
     return folder / "data"
 
 

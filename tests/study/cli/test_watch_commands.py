@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 @pytest.fixture(scope="module")
-def data(tmp_path_factory):
+def data(tmp_path_factory, sketching):
     folder = tmp_path_factory.mktemp("cli")
     protocol = folder / "small.toml"
     protocol.write_text(
@@ -33,7 +33,8 @@ def data(tmp_path_factory):
     )
     made = folder / "data"
     begin = ["study", "--protocol", str(protocol), "--observer", "scripted", "--subject", "S1", "--seed", "3"]
-    assert main([*begin, "--data", str(made)]) == 0
+    with sketching():
+        assert main([*begin, "--data", str(made)]) == 0
     return made
 
 

@@ -95,12 +95,13 @@ def namers(name: str, folder: Path) -> set[str]:
 
 
 def callers(name: str) -> set[str]:
-    folder = ROOT / "study" / ("" if name == "CompiledRig" else "devices")
+    folder = "study/" if name == "CompiledRig" else "study/devices/"
     found = set()
-    for path in folder.rglob("*.py"):
-        calls = [node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
-        if any(getattr(called, "id", getattr(called, "attr", None)) == name for called in calls):
-            found.add(path.relative_to(ROOT).as_posix())
+    for path, (tree, names) in sources(ROOT).items():
+        if path.startswith(folder) and name in names:
+            calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+            if any(getattr(called, "id", getattr(called, "attr", None)) == name for called in calls):
+                found.add(path)
     return found
 
 

@@ -16,7 +16,7 @@ from study.participants.intensity_cue import IntensityCue
 from study.participants.observer import Observer, PerceivedStimulus
 from study.participants.observer_catalogue import OBSERVER_DESCRIPTIONS, find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N
-from tests.slow_instances import slow
+from tests.slow_instances import slow, slow_rows
 
 FELT = PerceivedStimulus(
     run=0, trial=0, attempt=0, phase=Phase.TEST, frequency_hz=15.0, level_n=0.6, direction_shown=1, trials_before=0
@@ -25,11 +25,16 @@ N = 4000
 FOUR_ERRORS = 4 * np.sqrt(0.25 / N)
 
 
+def slow_but_first_and_last(rows) -> list:
+    return [rows[0], *slow_rows(*rows[1:-1]), rows[-1]]
+
+
 @cache
 def shown(trial: int, seed: int = 1) -> int:
     return draw_trial(ScheduleSettings(), "random", seed, 0, trial, 0).direction
 
 
+@cache
 def trials(frequency_hz: float = 15.0, level_n: float = 0.6, seed: int = 1) -> list[PerceivedStimulus]:
     """N trials of one run, directions drawn as a session draws them."""
     return [
@@ -53,13 +58,13 @@ def share_of_1(observer: Observer, felt: list[PerceivedStimulus], seed: int = 1)
     return float(np.mean([observer.reply(each, seed).answer == 1 for each in felt]))
 
 
-@pytest.mark.parametrize(("frequency_hz", "threshold_n"), TYPICAL_THRESHOLDS_N)
+@pytest.mark.parametrize(("frequency_hz", "threshold_n"), slow_but_first_and_last(TYPICAL_THRESHOLDS_N))
 def test_the_ideal_observer_is_right_79_percent_of_the_time_at_threshold(frequency_hz, threshold_n):
     ideal = find_observer("ideal", 0)
     assert share_right(ideal, trials(frequency_hz, threshold_n)) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
-@pytest.mark.parametrize("level_n", [0.1, pytest.param(0.3, marks=pytest.mark.slow), 0.6, 1.2, 3.0])
+@pytest.mark.parametrize("level_n", [0.1, 1.2, *slow(0.3, 0.6, 3.0)])
 def test_the_ideal_observers_answers_follow_the_weibull_curve(level_n):
     """Textbook form: 0.5 + 0.5 (1 - exp(-(x/a)^b)), a put so that 0.6 N gives the cube root of one half."""
     a = 0.6 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2)
@@ -73,7 +78,9 @@ def test_the_lapsing_observer_stays_below_certainty_where_the_ideal_one_is_certa
     assert share_right(find_observer("ideal", 0), trials(level_n=3.0)) == 1.0
 
 
-@pytest.mark.parametrize(("criterion", "expected"), [(0.0, 0.7937), (0.25, 0.786), (0.5, 0.766), (1.0, 0.697)])
+@pytest.mark.parametrize(
+    ("criterion", "expected"), [(1.0, 0.697), *slow_rows((0.0, 0.7937), (0.25, 0.786), (0.5, 0.766))]
+)
 def test_a_bias_to_one_answer_lowers_the_share_of_right_ones_as_detection_theory_says(criterion, expected):
     biased = DirectionFeeler("biased", TYPICAL_THRESHOLDS_N, criterion=criterion)
     both = [biased.compute_proportion_correct(replace(FELT, direction_shown=direction)) for direction in (1, 2)]
@@ -88,8 +95,8 @@ def test_the_biased_observer_says_1_more_often_and_the_ideal_one_does_not():
     assert share_of_1(find_observer("ideal", 0), felt) == pytest.approx(0.50, abs=FOUR_ERRORS)
 
 
-@pytest.mark.parametrize("name", ["guesser", "alternator", "always_1", "always_2"])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("name", ["guesser", *slow("alternator", "always_1", "always_2")])
+@pytest.mark.parametrize("seed", [1, *slow(2)])
 def test_who_feels_nothing_is_at_chance_even_at_the_cap_and_with_the_sessions_seed(name, seed):
     felt = trials(level_n=3.0, seed=seed)
     assert share_right(find_observer(name, seed), felt, seed) == pytest.approx(0.5, abs=FOUR_ERRORS)
@@ -112,7 +119,7 @@ def test_vibration_without_direction_above_its_frequency_and_full_sense_below():
     assert share_right(observer, trials(15.0, 3.0)) == 1.0
 
 
-@pytest.mark.parametrize(("level_n", "expected"), [(3.0, 0.9331), (0.1, 0.8556), (0.01, 0.5594)])
+@pytest.mark.parametrize(("level_n", "expected"), [(0.1, 0.8556), *slow_rows((3.0, 0.9331), (0.01, 0.5594))])
 def test_the_intensity_cue_works_wherever_strength_can_be_judged(level_n, expected):
     """Phi(3 dB / (2 x 1 dB sqrt(1 + (0.1 N / level)^2)))."""
     assert share_right(find_observer("intensity_cue", 0), trials(level_n=level_n)) == pytest.approx(
@@ -148,13 +155,13 @@ def detection(frequency_hz: float, level_n: float) -> list[PerceivedStimulus]:
     return [replace(felt, phase=Phase.DETECTION) for felt in trials(frequency_hz, level_n)]
 
 
-@pytest.mark.parametrize(("frequency_hz", "threshold_n"), TYPICAL_DETECTION_N)
+@pytest.mark.parametrize(("frequency_hz", "threshold_n"), slow_but_first_and_last(TYPICAL_DETECTION_N))
 def test_the_interval_is_found_79_percent_of_the_time_at_the_detection_threshold(frequency_hz, threshold_n):
     felt = detection(frequency_hz, threshold_n)
     assert share_right(find_observer("ideal", 0), felt) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
-@pytest.mark.parametrize("level_n", [pytest.param(0.02, marks=pytest.mark.slow), 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("level_n", [0.05, *slow(0.02, 0.1, 0.2)])
 def test_finding_the_interval_follows_a_weibull_curve_of_its_own(level_n):
     """Textbook form, with slope 2.5 and a so that 0.08 N gives the cube root of one half."""
     a = 0.08 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2.5)
@@ -175,7 +182,7 @@ def test_the_intensity_cue_finds_the_interval_79_percent_of_the_time_at_its_dete
     assert share_right(cue, detection(25.0, 0.1)) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
-@pytest.mark.parametrize("name", ["guesser", "alternator", "always_1", "always_2"])
+@pytest.mark.parametrize("name", ["alternator", *slow("guesser", "always_1", "always_2")])
 def test_who_feels_nothing_finds_no_interval(name):
     assert share_right(find_observer(name, 1), detection(15.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
 

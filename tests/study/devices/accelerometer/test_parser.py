@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from study.devices.accelerometer.parser import CRC_BYTES, PACKET_SIZE, SYNC, PacketParser, compute_crc
+from tests.slow_instances import slow, slow_rows
 from tests.study.devices.accelerometer.pty_board import encode_packets
 
 FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
@@ -91,7 +92,7 @@ def test_a_clock_that_began_anew_is_told_apart(first, times_us):
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
-def test_among_a_million_garbled_bytes_every_good_packet_is_found(seed):
+def test_among_garbled_bytes_every_good_packet_is_found(seed):
     """Packets between stretches of noise that is full of sync bytes; some packets lose bytes, some have one changed."""
     random = np.random.default_rng(seed)
     count = 20_000
@@ -163,10 +164,10 @@ def test_a_false_packet_that_ends_in_a_real_one_does_not_hide_it(overlap):
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
-def test_false_packets_among_a_million_garbled_bytes_count_for_nothing(seed):
+def test_false_packets_among_garbled_bytes_count_for_nothing(seed):
     """Whole ones with a right check sum, and ones that end in a real packet: neither hides, shifts nor restarts."""
     random = np.random.default_rng(seed)
-    data, raw = stream(25_000, seed=seed)
+    data, raw = stream(5000 if seed == 1 else 25_000, seed=seed)
     false = [encode_packets(int(random.integers(2**16)), int(random.integers(2**32)), [[1, 2, 3]]) for _ in range(50)]
     pieces = [data[: 2 * PACKET_SIZE]]
     for k in range(2, len(raw)):
@@ -179,16 +180,15 @@ def test_false_packets_among_a_million_garbled_bytes_count_for_nothing(seed):
             pieces.append(random.integers(0, 256, int(random.integers(0, 50)), dtype=np.uint8).tobytes())
         pieces.append(data[k * PACKET_SIZE : (k + 1) * PACKET_SIZE])
     garbled, parser, found, at = b"".join(pieces), PacketParser(), [], 0
-    assert len(garbled) > 10**6
+    assert len(garbled) > 40 * len(raw)
     while at < len(garbled):
         size = int(random.choice([1, 15, 16, 17, 64, 4096]))
         found.append(parser.feed(garbled[at : at + size]))
         at += size
     assert np.concatenate([samples.sequence for samples in found]).tolist() == list(range(len(raw)))
     assert (np.concatenate([samples.raw for samples in found]) == raw).all()
-    counts = parser.counts
-    assert (counts.packets, counts.lost, counts.restarts) == (len(raw), 0, 0)
-    assert counts.spoiled_bytes == len(garbled) - PACKET_SIZE * len(raw)
+    assert (parser.counts.packets, parser.counts.lost, parser.counts.restarts) == (len(raw), 0, 0)
+    assert parser.counts.spoiled_bytes == len(garbled) - PACKET_SIZE * len(raw)
 
 
 def with_crc_ending_in(start: bytes, sequence: int) -> tuple[bytes, np.ndarray]:
@@ -214,11 +214,11 @@ def test_a_packet_that_lost_its_last_bytes_does_not_hide_the_next_that_begins_wi
         assert (parser.counts.packets, parser.counts.spoiled_bytes, parser.counts.lost) == (4, 0, 0)
 
 
-@pytest.mark.parametrize("late_us", [pytest.param(75, marks=pytest.mark.slow), 250, 750])
+@pytest.mark.parametrize("late_us", [750, *slow(75, 250)])
 def test_packets_that_were_stamped_late_count(late_us):
     """Of two in a hundred by 0.3 to 3 periods, and the following ones as far as the board has to catch up."""
     rng = np.random.default_rng(late_us)
-    numbers = np.arange(5000)
+    numbers = np.arange(2500)
     due = 250 * numbers
     times = due + late_us * (rng.random(len(numbers)) < 0.02)
     for k in range(1, len(times)):
@@ -230,11 +230,11 @@ def test_packets_that_were_stamped_late_count(late_us):
     assert (parser.counts.lost, parser.counts.spoiled_bytes, parser.counts.restarts) == (0, 0, 0)
 
 
-@pytest.mark.parametrize(("period_us", "late_us"), [(250, 205), (250, 249), (100, 99), (500, 499)])
+@pytest.mark.parametrize(("period_us", "late_us"), [(250, 249), *slow_rows((250, 205), (100, 99), (500, 499))])
 def test_packets_that_were_stamped_just_before_the_next_count(period_us, late_us):
     """Late by all but 1 to 45 µs of a period, one in ten, some of them in a row."""
     rng = np.random.default_rng(late_us)
-    numbers = np.arange(5000)
+    numbers = np.arange(2500)
     times = period_us * numbers + late_us * (rng.random(len(numbers)) < 0.1)
     data = encode_packets(numbers, times, rng.integers(0, 2**16, (len(numbers), 3), dtype=np.uint16))
     parser = PacketParser()

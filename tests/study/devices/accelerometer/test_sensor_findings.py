@@ -25,7 +25,7 @@ def found(
     drift_ppm=0.0,
     noise_mps2=(0.04, 0.04, 0.08),
     spoil=lambda block: block,
-    measurement_s=1.5,
+    measurement_s=0.8,
 ):
     monkeypatch.setattr(sensor_findings, "MEASUREMENT_S", measurement_s)
     with contextlib.closing(Board(rate_hz, drift_ppm)) as board:
@@ -59,7 +59,7 @@ def garbled(block: bytes) -> bytes:
     [
         ({"rate_hz": 1000.0}, "Sensor rate", "samples per second", "PERIOD_US"),
         ({"spoil": garbled}, "Sensor losses", "packets lost, torn or garbled", "short cable"),
-        ({"drift_ppm": 3000.0}, "Sensor clock", "ppm slow", "microseconds"),
+        ({"drift_ppm": 3000.0, "measurement_s": 1.5}, "Sensor clock", "ppm slow", "microseconds"),
         ({"noise_mps2": (0.04, 0.04, 1.0)}, "Sensor noise", "rms at rest", "capacitors"),
         ({"noise_mps2": (0.04, 0.0, 0.08)}, "Sensor noise", "does not move at all", "wire"),
     ],

@@ -10,6 +10,7 @@ from equalizer.signals.lockin import estimate_phasors
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.rig import AsynchronousAccelerometer
+from tests.slow_instances import slow_rows
 from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, Board, table_of, within
 
 # The board is a thread of this process behind a pseudo-terminal: with all cores full it may send late.
@@ -46,9 +47,7 @@ def newest_of(sensor: Accelerometer) -> np.ndarray:
     return sensor.read_latest()[0]
 
 
-@pytest.mark.parametrize(
-    ("rate_hz", "drift_ppm"), [(2000.0, 150.0), pytest.param(4000.0, -150.0, marks=pytest.mark.slow), (10_000.0, 40.0)]
-)
+@pytest.mark.parametrize(("rate_hz", "drift_ppm"), [*slow_rows((2000.0, 150.0), (4000.0, -150.0)), (10_000.0, 40.0)])
 def test_a_tone_comes_out_with_its_phase_on_the_ticks(rate_hz, drift_ppm):
     # The 32 bits of its clock begin anew on the way.
     with contextlib.closing(Board(rate_hz, drift_ppm, first_us=2**32 - 2_500_000)) as board, opened(board) as sensor:

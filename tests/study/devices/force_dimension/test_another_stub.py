@@ -13,6 +13,7 @@ from study.devices.force_dimension.library import SIGNATURES
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
+from tests.slow_instances import each_pair_once, slow
 
 WATCHED = ("dhdSetWatchdog", "dhdGetWatchdog")
 OPENING = (
@@ -56,9 +57,9 @@ def test_a_force_that_is_changed_without_a_word_ends_the_trial(stepped_stub, rig
     assert "It repeatedly reports another force than the one that it was sent" in said
 
 
-@pytest.mark.parametrize("frequency_hz", [5, 25, 40, 45])
-@pytest.mark.parametrize("amplitude_n", [0.3, 0.5, 1.0, 1.9])
-@pytest.mark.parametrize("gain", [0.0, 0.7, 1.3])
+@pytest.mark.parametrize(
+    ("gain", "amplitude_n", "frequency_hz"), each_pair_once([0.0, 0.7, 1.3], [0.3, 0.5, 1.0, 1.9], [5, 25, 40, 45])
+)
 def test_a_force_that_is_scaled_without_a_word_ends_the_trial_although_it_is_weak(
     stepped_stub, rigs, gain, amplitude_n, frequency_hz
 ):
@@ -82,11 +83,10 @@ HONEST = (
     {"stiffness": 150}, {"silent_gain": 0.9}, {"silent_gain": 1.1}, {"told_step": 0.1}, {"told_noise": 0.1},
     {"told_step": 0.2, "told_noise": 0.05}, {"weight": 2.0},
 )  # fmt: skip
+HELD = each_pair_once(HONEST, [0.1, 0.25, 1.0, 3.0], [5, 20, 25, 40, 50])
 
 
-@pytest.mark.parametrize("frequency_hz", [5, 20, 25, 40, 50])
-@pytest.mark.parametrize("amplitude_n", [0.1, 0.25, 1.0, 3.0])
-@pytest.mark.parametrize("switches", HONEST, ids=str)
+@pytest.mark.parametrize(("switches", "amplitude_n", "frequency_hz"), HELD, ids=str)
 def test_a_device_that_gives_what_it_was_sent_is_not_suspected(stepped_stub, rigs, switches, frequency_hz, amplitude_n):
     """What it says may be a tick old, rounded and noisy, and one in thirty forces may be scaled."""
     for name, value in switches.items():
@@ -109,7 +109,7 @@ def test_a_device_that_tells_no_force_is_not_judged_by_it(stepped_stub, rigs, to
     assert lost_words(stepped_stub, rigs, lambda stub: None) == (Fault.NONE, "")
 
 
-@pytest.mark.parametrize("stiffness", [0, 150, 1000])
+@pytest.mark.parametrize("stiffness", [150, *slow(0, 1000)])
 @pytest.mark.parametrize(("amplitude_n", "frequency_hz"), [(1.0, 5), (1.0, 20), (2.0, 25), (3.0, 40), (3.0, 50)])
 def test_an_encoder_that_freezes_is_noticed_within_a_second_under_a_force_that_moves_any_hand(
     stepped_stub, rigs, amplitude_n, frequency_hz, stiffness
@@ -245,7 +245,7 @@ def test_an_error_while_it_is_closed_leaves_no_force_and_one_that_matters_is_sai
 
 
 @pytest.mark.real_time
-@pytest.mark.parametrize("function", ["dhdStop", "dhdSetBrakes"])
+@pytest.mark.parametrize("function", ["dhdStop", *slow("dhdSetBrakes")])
 def test_a_call_that_hangs_while_it_is_closed_leaves_no_force_and_is_said(stub, rigs, capfd, function):
     took_s = held_and_closed(stub, rigs, lambda: stub.delay(function, 1.5))
     said = capfd.readouterr().err

@@ -16,6 +16,7 @@ from study.devices.force_dimension.loop_cells import (
     check_status,
 )
 from study.devices.force_dimension.tick_io import STATUS_CHECK_TICKS, STATUS_CYCLE_TICKS
+from tests.slow_instances import slow
 
 AMPLITUDES_N = (0.2, 0.25, 0.3, 0.5, 1.0, 1.9, 3.0)
 FREQUENCIES_HZ = (5, 7, 12.5, 20, 25, 30, 35, 40, 45, 50, 80, 1000 / 14, 1000 / 21, 1000 / 22, 1000 / 42)
@@ -52,7 +53,7 @@ def draw_trials(random, gain: float, age: int, step_n: float, noise_n: float, am
     return force, step_n * np.round(told / step_n) if step_n else told
 
 
-@pytest.mark.parametrize("age", [pytest.param(0, marks=pytest.mark.slow), *range(1, FORCE_MEMORY)])
+@pytest.mark.parametrize("age", [1, *slow(0, *range(2, FORCE_MEMORY))])
 def test_a_report_that_is_late_rounded_noisy_and_off_by_a_weight_is_not_suspected(age):
     random = np.random.default_rng(age)
     for _ in range(200):
@@ -61,12 +62,12 @@ def test_a_report_that_is_late_rounded_noisy_and_off_by_a_weight_is_not_suspecte
         assert suspected_after(*drawn) == -1
 
 
-@pytest.mark.parametrize("age", range(FORCE_MEMORY))
+@pytest.mark.parametrize("age", [1, *slow(0, *range(2, FORCE_MEMORY))])
 @pytest.mark.parametrize("gain", [0.7, 1.3])
 def test_a_gain_that_is_off_by_30_percent_is_suspected_in_the_first_trial(age, gain):
     random = np.random.default_rng(age)
     for _ in range(100):
-        drawn = draw_trials(random, gain, age, 0.02, 0.02, random.choice(AMPLITUDES_N[2:]), seconds=20)
+        drawn = draw_trials(random, gain, age, 0.02, 0.02, random.choice(AMPLITUDES_N[2:]), seconds=4)
         assert 0 < suspected_after(*drawn) < 2500
 
 

@@ -13,6 +13,7 @@ from numba import njit
 from study.devices.drive.stepped_runner import DEVICE_CLOSE_TIMEOUT_S
 from study.devices.force_dimension.rig import JOIN_TIMEOUT_S
 from study.devices.native import acquire, read_clock_s, release, sleep_until
+from tests.slow_instances import slow_rows
 
 pytestmark = pytest.mark.real_time
 
@@ -129,8 +130,14 @@ def test_closing_waits_for_a_zero_that_hangs_no_longer_than_half_of_its_time(stu
         assert rig._zero_thread.is_alive() and stub.safe
 
 
-@pytest.mark.parametrize("late_s", [0.3, 0.8], ids=["waited for", "given up"])
-@pytest.mark.parametrize("function", ["dhdGetStatus", "dhdSetBrakes", "dhdEnableForce"])
+@pytest.mark.parametrize(
+    ("function", "late_s"),
+    [
+        *(("dhdGetStatus", 0.3), ("dhdSetBrakes", 0.8), ("dhdEnableForce", 0.3)),
+        *slow_rows(("dhdGetStatus", 0.8), ("dhdSetBrakes", 0.3), ("dhdEnableForce", 0.8)),
+    ],
+    ids=lambda value: {0.3: "waited for", 0.8: "given up"}.get(value),
+)
 def test_a_call_that_wakes_the_device_too_late_leaves_it_braked_once_it_is_closed(
     stub, vendor, monkeypatch, function, late_s
 ):

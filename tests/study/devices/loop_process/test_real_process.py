@@ -17,6 +17,7 @@ from study.devices.clock import RealClock
 from study.devices.device import Fault
 from study.devices.opening import open_device
 from study.errors import DeviceError
+from tests.slow_instances import slow_rows
 from tests.study.devices.loop_process.awaited import STARTS, becomes, hold_force, runs
 
 pytestmark = pytest.mark.real_time
@@ -182,7 +183,7 @@ def check_it_is_lost(device, rigs, said: str) -> None:
     assert (played.recording, played.health.fault) == (None, Fault.LOST)
 
 
-@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("end", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.slow)])
 def test_a_loop_that_is_killed_or_stopped_loses_its_force_by_the_watchdog_and_the_program_says_so(
     stub, rigs, opened, end
 ):
@@ -240,13 +241,12 @@ def test_recordings_come_back_and_no_loop_runs_in_this_program(stub, rigs, opene
 
 
 def locked_kb() -> int:
-    lines = Path("/proc/self/status").read_text("ascii").splitlines()
-    return int(next(line for line in lines if line.startswith("VmLck")).split()[1])
+    return int(Path("/proc/self/status").read_text("ascii").partition("VmLck:")[2].split()[0])
 
 
 @pytest.mark.parametrize(
     ("switches", "said"),
-    [({"devices": 0}, "No device of the vendor answers"), ({"calibrated": 0}, "not calibrated")],
+    [({"devices": 0}, "No device of the vendor answers"), *slow_rows(({"calibrated": 0}, "not calibrated"))],
 )
 def test_why_it_does_not_open_is_said_in_the_same_words_and_nothing_is_left_running(stub, rigs, switches, said):
     set_switches(stub, switches)

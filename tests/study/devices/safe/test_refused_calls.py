@@ -55,6 +55,9 @@ REFUSED = {
     "changes by 2771 N/s": lambda s: replace(
         s, loop=replace(s.loop, samples=s.loop.samples * 0.0 + 1.6), fade_in_s=1e-4, fade_out_s=1e-4
     ),
+    "because it changes by 2771 N/s": lambda s: replace(  # a fade of one tick is none
+        s, loop=replace(s.loop, samples=s.loop.samples * 0.0 + 1.6), fade_in_s=1e-3
+    ),
     "fade_in_s is nan": lambda s: replace(s, fade_in_s=float("nan")),
     "fade_out_s is -1": lambda s: replace(s, fade_out_s=-1.0),
     "fade shape is 'square'": lambda s: replace(s, fade_shape="square"),

@@ -115,6 +115,25 @@ def test_datasets_of_hdf5_are_named_by_their_path(tmp_path):
     np.testing.assert_array_equal(read(tmp_path / "a.h5")["run1/force"], U)
 
 
+def test_a_scale_that_is_stated_beside_a_dataset_is_reported(tmp_path):
+    """Such as of netCDF; counts were taken for newtons without a word."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name in ("force [N]", "plain"):
+            file[name] = np.arange(40, dtype="i2")
+            file[name].attrs.update({"scale_factor": np.array([1.0]), "add_offset": 0})
+        file["force [N]"].attrs.update({"scale_factor": 0.001, "add_offset": 5})
+    arrays = read_arrays(tmp_path / "a.h5", CsvMap())
+    assert arrays.notes == (
+        "force [N]: its attribute scale_factor = 0.001 and add_offset = 5 was not applied; a map can state it in "
+        "`value`.",
+    )
+    assert arrays.by_name["force [N]"][-1] == 39
+    with h5py.File(tmp_path / "a.h5", "r+") as file:  # of the wrong kind, and as long as an attribute may be
+        file["force [N]"].attrs["scale_factor"] = np.arange(8000.0)
+    (note,) = read_arrays(tmp_path / "a.h5", CsvMap()).notes
+    assert note.startswith("force [N]: its attribute scale_factor = 0.0, 1.0, ") and len(note) < 200
+
+
 @pytest.mark.parametrize("name", ["a.npz", "a.npy", "a.mat", "a.h5"])
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut off", b"\x93NUMPY\x01\x00", bytes(range(256)) * 4])
 def test_a_damaged_file_is_a_named_error(tmp_path, name, content):

@@ -20,7 +20,7 @@ from study.workflows.checks.check_installation import check_privacy
 from study.workflows.files.validate import validate_file
 from study.workflows.session.plan_sitting import plan_sitting
 
-pytestmark = pytest.mark.usefixtures("validated_here")
+pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
 
 CORPUS = Path(__file__).resolve().parents[3] / "frozen" / "v0_1"
 LIVE = LiveState(

@@ -1,12 +1,15 @@
 """Languages by code and by file, in the file of a protocol, under a lock and in the log."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from protocols.document.hashing import hash_protocol
 from protocols.wording.english import ENGLISH, LANGUAGES
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
+from study.store.formats import participant_texts
 from study.store.formats.participant_texts import make_language_template, read_language
 from study.store.formats.protocol_files import (
     LockedProtocolChangedError,
@@ -15,6 +18,7 @@ from study.store.formats.protocol_files import (
     read_protocol,
     read_study_protocol,
 )
+from study.workflows.files.validate import validate_file
 
 
 @pytest.fixture
@@ -106,3 +110,54 @@ def test_a_text_changed_under_a_lock_is_another_protocol(mine, french, tmp_path)
     french.write_text(french.read_text("utf-8").replace("« Rest »", "« Break »"), encoding="utf-8")
     with pytest.raises(LockedProtocolChangedError):
         read_protocol(path)
+
+
+def add_a_text(monkeypatch):
+    """As a later version of hapteq may: a new text, and a better German one."""
+    shipped = dict(participant_texts.tomllib.loads(make_language_template("de")))
+    longer = {**ENGLISH, "new_text": "New."}
+    monkeypatch.setattr(participant_texts, "ENGLISH", longer)
+    monkeypatch.setattr("protocols.wording.translation.ENGLISH", longer)
+
+    class Newer:
+        loads = staticmethod(participant_texts.tomllib.loads)
+
+    def loads(text):
+        table = Newer.loads(text)
+        return {**shipped, "new_text": "Neu.", "rest_title": "Erholung"} if table == shipped else table
+
+    monkeypatch.setattr(participant_texts, "tomllib", SimpleNamespace(loads=loads))
+
+
+@pytest.mark.parametrize("stated", ['language = "de"', 'language = "de"\n[text.words]\nrest_relax = "Bitte ruhen."'])
+def test_a_lock_in_german_holds_when_a_later_version_changes_its_texts(mine, tmp_path, monkeypatch, stated):
+    path = mine(stated)
+    before = read_study_protocol(path)
+    lock_protocol(before, tmp_path, "2026-11-22T10:00:00+00:00", "0.1.0")
+    add_a_text(monkeypatch)
+    assert read_study_protocol(path).protocol == before.protocol
+    assert read_study_protocol(path).text == before.text
+    mine(stated.replace('"de"', '"es"'))
+    with pytest.raises(LockedProtocolChangedError):
+        read_study_protocol(path)
+
+
+@pytest.mark.usefixtures("validated_here")
+@pytest.mark.parametrize("name", ["fr.toml", "en.toml"])
+def test_a_lock_with_a_table_of_ones_own_holds_when_a_later_version_needs_another_text(
+    mine, french, tmp_path, monkeypatch, name
+):
+    """Also one of one's own English."""
+    french = french.rename(tmp_path / name)
+    path = mine(f'language = "{name}"')
+    before = read_study_protocol(path)
+    lock_protocol(before, tmp_path, "2026-11-22T10:00:00+00:00", "0.1.0")
+    filled = tmp_path / "filled.toml"
+    filled.write_text(before.text, encoding="utf-8")
+    add_a_text(monkeypatch)
+    for source in (path, str(filled)):
+        assert read_study_protocol(source).protocol == before.protocol
+        assert validate_file(Path(source)).problems == ()
+    french.write_text(french.read_text("utf-8").replace("« Practice", "« practice"), encoding="utf-8")
+    with pytest.raises(LockedProtocolChangedError):
+        read_study_protocol(path)

@@ -1,3 +1,4 @@
+import errno
 import os
 
 import pytest
@@ -75,6 +76,16 @@ def test_a_lock_that_cannot_be_made_is_said_so(tmp_path):
     (tmp_path / PLACES_LOCK_NAME).mkdir()
     with pytest.raises(StudyError, match="The data folder cannot be written to"), hold_places_lock(tmp_path):
         raise AssertionError("held")
+
+
+def test_a_network_drive_without_locks_is_named_as_the_cause(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(pytest.importorskip("fcntl"), "flock", refuse)
+    with pytest.raises(StudyError, match="The session's folder cannot be locked.*no file locks") as refused:
+        hold_session_lock(tmp_path).__enter__()
+    assert "local disk" in refused.value.do_now and "permissions" not in refused.value.do_now
 
 
 def test_a_name_that_something_else_has_taken_is_skipped(tmp_path):
