@@ -16,6 +16,8 @@ from equalizer.signals.signal import FloatArray
 
 _INITIAL_LEVEL_RATIO = 1.3
 """Ratio of the two levels in the starting values that are tried in addition to the measured ones. Chosen."""
+_LEAST_LEVEL_SHARE = 0.05
+"""Least measured level, relative to the mean of both. Chosen."""
 
 
 @compile_law
@@ -26,9 +28,9 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Find starting values: the levels by regression of the missing force on either direction of sliding, each at least
-    5 % of their mean (chosen), then two pairs of levels with the ratio `_INITIAL_LEVEL_RATIO` and the same mean. Empty
-    where the mean level is not positive."""
+    """Find starting values: the levels by regression of the missing force on either direction of sliding, then two
+    pairs of levels with the ratio `_INITIAL_LEVEL_RATIO` and the same mean. Empty where the mean level is not
+    positive."""
     motion = select_sliding_motion(evidence, axis)
     is_forward = np.asarray(motion.velocity > 0, dtype=np.float64)
     # No constant force among the regressors: it would absorb the asymmetry.
@@ -38,21 +40,13 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     mean_level = (positive_level + negative_level) / 2
     if mean_level <= 0:
         return ()
-    measured_levels = {
-        "level_positive": max(positive_level, 0.05 * mean_level),
-        "level_negative": max(negative_level, 0.05 * mean_level),
-    }
-    high_level, low_level = (
-        2 * mean_level * _INITIAL_LEVEL_RATIO / (1 + _INITIAL_LEVEL_RATIO),
-        2 * mean_level / (1 + _INITIAL_LEVEL_RATIO),
-    )
-    candidates = ((high_level, low_level), (low_level, high_level))
+    least_level = _LEAST_LEVEL_SHARE * mean_level
+    low_level = 2 * mean_level / (1 + _INITIAL_LEVEL_RATIO)
+    high_level = _INITIAL_LEVEL_RATIO * low_level
     return (
-        measured_levels,
-        *(
-            {"level_positive": trial_positive, "level_negative": trial_negative}
-            for trial_positive, trial_negative in candidates
-        ),
+        {"level_positive": max(positive_level, least_level), "level_negative": max(negative_level, least_level)},
+        {"level_positive": high_level, "level_negative": low_level},
+        {"level_positive": low_level, "level_negative": high_level},
     )
 
 

@@ -16,9 +16,10 @@ from equalizer.effects.starts.starting_values import PartialRegression, compute_
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-_INITIAL_MODEL_SHARE = 0.1
-"""Second set of starting values, relative to the model's own mass, damping and stiffness along the axis. In the first
-set, a tenth of the value of the second set replaces each estimate that is not positive. Chosen."""
+_MODEL_SHARE = 0.1
+"""Starting values of the second set, relative to the model's own mass, damping and stiffness along the axis. Chosen."""
+_LEAST_ESTIMATE_RATIO = 0.1
+"""Starting value of the first set where its estimate is not positive, relative to that of the second set. Chosen."""
 
 
 def _add_impedance(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
@@ -35,23 +36,22 @@ def _add_impedance(model: MechanicalModel, axis: int, values: Values) -> Mechani
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find two sets of starting values: by linear regression of the missing force, and as a share of the model's own
-    mass, damping and stiffness (`_INITIAL_MODEL_SHARE`)."""
+    mass, damping and stiffness (`_MODEL_SHARE`)."""
     motion = select_axis_motion(evidence, axis)
     regression = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
     estimates = regression.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
     direction, model = compute_driven_axes(evidence.model)[:, axis], evidence.model
     model_shares = [
-        _INITIAL_MODEL_SHARE * compute_quadratic_form(matrix, direction)
+        _MODEL_SHARE * compute_quadratic_form(matrix, direction)
         for matrix in (model.mass, model.damping, model.stiffness)
     ]
     positive_estimates = [
-        estimate if estimate > 0 else 0.1 * model_share
+        estimate if estimate > 0 else _LEAST_ESTIMATE_RATIO * model_share
         for estimate, model_share in zip(estimates, model_shares, strict=True)
     ]
-    parameter_names = ("mass", "damping", "stiffness")
     return tuple(
-        dict(zip(parameter_names, parameter_values, strict=True))
-        for parameter_values in (positive_estimates, model_shares)
+        dict(zip(("mass", "damping", "stiffness"), values, strict=True))
+        for values in (positive_estimates, model_shares)
     )
 
 

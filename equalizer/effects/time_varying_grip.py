@@ -19,9 +19,12 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-HIGHEST_MODULATION_HZ, START_COUNT = 15.0, 2
-"""Highest modulation frequency (Hz) that is searched, above that of tremor (8 to 12 Hz); and number of starting
-values. Chosen."""
+HIGHEST_MODULATION_HZ = 15.0
+"""Highest modulation frequency (Hz) that is searched, above that of tremor (8 to 12 Hz). Chosen."""
+START_COUNT = 2
+"""Number of starting values. Chosen."""
+STIFFNESS_SHARE_RANGE = (-0.5, 2.0)
+"""Range of the parameter `stiffness_share`. Chosen."""
 _POINTS_PER_LINE = 16
 """Zero padding of the spectrum: points per line (one cycle per recording), so that a frequency is found to a sixteenth
 of a line."""
@@ -111,12 +114,12 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 def _compute_grip_values(modulation_hz: float, strengths: FloatArray) -> Values:
     """Compute the parameters from the weights of the damping force times sine and cosine, then of the spring force
     times these. The stiffness share is the projection of the spring force's modulation on that of the damping force,
-    limited to the range of the parameter in `EFFECT` (chosen)."""
+    limited to `STIFFNESS_SHARE_RANGE`."""
     sine, cosine, spring_sine, spring_cosine = strengths.tolist()
     depth = float(np.hypot(sine, cosine))
     stiffness_share = (spring_sine * sine + spring_cosine * cosine) / max(depth**2, np.finfo(float).tiny)
     phase = float(np.arctan2(cosine, sine))
-    stiffness_share = float(np.clip(stiffness_share, -0.5, 2.0))
+    stiffness_share = float(np.clip(stiffness_share, *STIFFNESS_SHARE_RANGE))
     return {"rate_hz": modulation_hz, "depth": depth, "phase": phase, "stiffness_share": stiffness_share}
 
 
@@ -183,7 +186,7 @@ EFFECT = Effect(
         Parameter("rate_hz", 1e-4, 1e3, none=None, step=0.002),
         Parameter("depth", 1e-6, 1.5, none=0.0),
         Parameter("phase", -1e3, 1e3, none=None, scale="linear", step=0.02),
-        Parameter("stiffness_share", -0.5, 2.0, none=None, scale="linear", step=0.02),
+        Parameter("stiffness_share", *STIFFNESS_SHARE_RANGE, none=None, scale="linear", step=0.02),
     ),
     action=AxisForce(_compute_mean_force, _pack_parameters),
     starts=_find_starting_values,

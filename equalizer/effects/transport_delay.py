@@ -15,6 +15,8 @@ from equalizer.signals.signal import FloatArray
 
 SHORTEST_DELAY_S, LONGEST_DELAY_S = 2e-5, 0.05
 """Range of delays (s) among which starting values are searched. Chosen."""
+TRIAL_DELAY_COUNT = 24
+"""Number of trial delays in that range, at constant ratios. Chosen."""
 JUMP_MARGIN_PERIODS = 0.15
 """Distance of the second starting value from the nearest whole number of hold times, in hold times (sample periods).
 Chosen. An acceleration follows a force without delay, so that the misfit jumps where the delay passes a whole number of
@@ -34,9 +36,8 @@ def _delay_force_at_end(commands: FloatArray, step_s: float, values: Values) -> 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find delays (s) from the response's time shift and from the missing force, and the first of these moved across
     the jump of the misfit (`JUMP_MARGIN_PERIODS`). Empty where the measured response is early (`list_lag_starts`)."""
-    force_delay_s = find_command_parameter(
-        evidence, axis, compute_delayed_mean, list(np.geomspace(SHORTEST_DELAY_S, LONGEST_DELAY_S, 24)), False
-    )
+    trial_delays_s = list(np.geomspace(SHORTEST_DELAY_S, LONGEST_DELAY_S, TRIAL_DELAY_COUNT))
+    force_delay_s = find_command_parameter(evidence, axis, compute_delayed_mean, trial_delays_s, False)
     delays_s = list_lag_starts(evidence, axis, force_delay_s, LONGEST_DELAY_S)
     moved_delays_s = tuple(_move_across_jump(delay_s, 1 / evidence.sample_rate_hz) for delay_s in delays_s[:1])
     return tuple({"delay": delay_s} for delay_s in (*delays_s, *moved_delays_s))

@@ -1,6 +1,6 @@
-"""Calibration of a linkage: the Jacobian, inertia and gravity that a device reports over a grid of positions, and the
-plausibility checks of these readings. Mirror lines are the traces of the arms' planes of symmetry in the plane y-z, see
-`mirror_lines`.
+"""Calibration of a linkage: the Jacobian, inertia and gravity that a device reports over a grid of positions, the
+plausibility checks of these readings, and the inertia between the positions (`estimate_local_inertia`). Mirror lines
+are the traces of the arms' planes of symmetry in the plane y-z, see `mirror_lines`.
 
 J is the Jacobian of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong,
 Hutchinson, Vidyasagar, Robot Modeling and Control, chapter 4). Inertia M(x) is that at the handle (operational space).

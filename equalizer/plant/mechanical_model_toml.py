@@ -34,6 +34,10 @@ MATRIX_KEYS = ("mass", "damping", "stiffness", "input", "output")
 _MODEL_KEYS = ("name", "quantity", *MATRIX_KEYS, "rotational")
 _TOP_LEVEL_KEYS = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
 """Tables of the document; `rotational`, a key of [model], is accepted at the top level as well."""
+_LAW_KEYS = ("acts_on", "expression")
+"""Keys of a table [[effect]] that only a discovered law has, both texts."""
+_MAX_QUOTED_LENGTH = 80
+"""Characters of a value that are quoted in a message."""
 
 UNITS_KEY = "units"
 """Key of the table [provenance] for the units of force, length and time, where the model's values are not in SI
@@ -217,10 +221,6 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
     return () if problems else tuple(_convert_parameters_to_float(effect) for effect in effects)
 
 
-_LAW_KEYS = ("acts_on", "expression")
-"""Keys of a table [[effect]] that only a discovered law has, both texts."""
-
-
 def _read_law(entry: Mapping[str, Any], effect_number: int, problems: list[str]) -> Law | None:
     """Read the law of a discovered effect; None, with an entry in `problems`, where it is incomplete or not valid."""
     missing_keys = [key for key in (*_LAW_KEYS, "axis") if not isinstance(entry.get(key), str)]
@@ -252,12 +252,12 @@ def _is_number(value: Any) -> bool:
 
 
 def _quote_value(value: Any) -> str:
-    """Quote a value as text for an error message, cut to 80 characters."""
+    """Quote a value as text for an error message, cut to `_MAX_QUOTED_LENGTH`."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # Python does not print integers of more than 4300 digits
         return "a value that cannot be shown"
-    return text if len(text) <= 80 else f"{text[:80]}…"
+    return text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}…"
 
 
 def _format_section(heading: str, table: Mapping[str, Any]) -> list[str]:

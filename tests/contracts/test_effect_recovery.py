@@ -16,6 +16,7 @@ from equalizer.effects.effect import ALL_SITES
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
+from tests.slow_instances import slow_rows
 
 ONE_AXIS = (
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "position_dependent_friction",
@@ -23,6 +24,8 @@ ONE_AXIS = (
     "constant_force", "cogging", "end_stop", "pose_dependent_inertia", "extra_mode", "added_mass", "hand_impedance",
     "time_varying_grip", "body_on_actuator",
 )  # fmt: skip
+REFINED = ("coulomb_friction", "hardening_stiffness", "quadratic_damping", "added_mass", "hand_impedance", "extra_mode")
+"""Those of `ONE_AXIS` that are refined in the quick tests too."""
 
 
 @pytest.fixture(scope="module")
@@ -62,19 +65,33 @@ def started(bench, model, name, sites, seen):
     return effect.starts(bench.evidence(model, seen), site)
 
 
-@pytest.mark.parametrize("name", ONE_AXIS)
-def test_an_effect_starts_near_its_truth_and_is_refined_to_it(name, bench):
+def measured_alone(bench, name):
+    """Of the effect on one axis: the model, its sites, what is seen, and its first start."""
     model = bench.one_axis()
     placed = bench.example(name, model)
     seen = bench.measured(model, placed, bench.commands(1, periods=1))
+    start = started(bench, model, name, placed[0].sites, seen)[0]
     truth, main = bench.EXAMPLES[name], EFFECTS_BY_NAME[name].main.name
-    starts = started(bench, model, name, placed[0].sites, seen)
-    assert starts[0][main] == pytest.approx(truth[main], rel=0.3)
-    found = refined(bench, model, name, starts[0], placed[0].sites, seen)
-    assert found[main] == pytest.approx(truth[main], rel=0.02)
+    assert start[main] == pytest.approx(truth[main], rel=0.3)
+    return model, placed[0].sites, seen, start
 
 
-@pytest.mark.parametrize(("name", "axis"), [("coulomb_friction", 2), ("extra_mode", 1), ("cogging", 0)])
+@pytest.mark.parametrize("name", ONE_AXIS)
+def test_an_effect_starts_near_its_truth(name, bench):
+    measured_alone(bench, name)
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in REFINED else pytest.param(name, marks=pytest.mark.slow) for name in ONE_AXIS]
+)
+def test_an_effect_starts_near_its_truth_and_is_refined_to_it(name, bench):
+    model, sites, seen, start = measured_alone(bench, name)
+    main = EFFECTS_BY_NAME[name].main.name
+    found = refined(bench, model, name, start, sites, seen)
+    assert found[main] == pytest.approx(bench.EXAMPLES[name][main], rel=0.02)
+
+
+@pytest.mark.parametrize(("name", "axis"), [("coulomb_friction", 2), ("extra_mode", 1), *slow_rows(("cogging", 0))])
 def test_it_is_recovered_at_one_of_three_axes(name, axis, bench):
     model, truth = bench.three_axes(), dict(bench.EXAMPLES[name])
     if name == "extra_mode":

@@ -54,19 +54,14 @@ def _write_all_axes(
     is contained in their measured motion."""
     for read_axis in range(commands.shape[1]):
         block, own_axis_factor = LENGTH + BLOCK_SIZE * read_axis, 1.0 if read_axis == axis else 0.0
-        step_motion[block + AXIS_X], step_motion[block + AXIS_V] = motion[0][k, read_axis], motion[1][k, read_axis]
-        step_motion[block + AXIS_X_END], step_motion[block + AXIS_V_END] = (
-            motion[0][k + 1, read_axis],
-            motion[1][k + 1, read_axis],
-        )
-        step_motion[block + AXIS_X_PER_N], step_motion[block + AXIS_V_PER_N] = (
-            own_axis_factor * per_newton[0, read_axis],
-            own_axis_factor * per_newton[1, read_axis],
-        )
-        step_motion[block + AXIS_A], step_motion[block + AXIS_A_PER_N] = (
-            motion[2][k, read_axis],
-            own_axis_factor * per_newton[2, read_axis],
-        )
+        step_motion[block + AXIS_X] = motion[0][k, read_axis]
+        step_motion[block + AXIS_V] = motion[1][k, read_axis]
+        step_motion[block + AXIS_A] = motion[2][k, read_axis]
+        step_motion[block + AXIS_X_END] = motion[0][k + 1, read_axis]
+        step_motion[block + AXIS_V_END] = motion[1][k + 1, read_axis]
+        step_motion[block + AXIS_X_PER_N] = own_axis_factor * per_newton[0, read_axis]
+        step_motion[block + AXIS_V_PER_N] = own_axis_factor * per_newton[1, read_axis]
+        step_motion[block + AXIS_A_PER_N] = own_axis_factor * per_newton[2, read_axis]
         step_motion[block + AXIS_COMMAND] = commands[k, read_axis]
 
 
@@ -99,11 +94,9 @@ def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
         for place_index in range(places.shape[0]):
             axis = places[place_index, 1]
             step_motion[X], step_motion[V] = position[k, axis], velocity[k, axis]
-            step_motion[X_PER_N], step_motion[V_PER_N], step_motion[A_PER_N] = (
-                per_newton[0, axis],
-                per_newton[1, axis],
-                per_newton[2, axis],
-            )
+            step_motion[X_PER_N] = per_newton[0, axis]
+            step_motion[V_PER_N] = per_newton[1, axis]
+            step_motion[A_PER_N] = per_newton[2, axis]
             step_motion[X_FREE] = position[k + 1, axis] + step_motion[X_PER_N] * unbalanced_force[axis]
             step_motion[V_FREE] = velocity[k + 1, axis] + step_motion[V_PER_N] * unbalanced_force[axis]
             step_motion[A_FREE] = acceleration[k, axis] + step_motion[A_PER_N] * unbalanced_force[axis]

@@ -16,6 +16,8 @@ from equalizer.identification.frequency_response.frequency_response import BoolA
 from equalizer.identification.frequency_response.local_polynomial import LocalPolynomial
 from equalizer.signals.signal import ComplexArray, FloatArray
 
+_SMOOTHING_ORDER = 2
+"""Order of the local polynomials by which the response is smoothed. Chosen."""
 _HIGHEST_RESAMPLED_RATIO = 1.5
 """Frequency up to which the resampled curves are computed, relative to the onset. Chosen: a drawn onset above it counts
 as the highest frequency."""
@@ -27,10 +29,10 @@ class OnsetRule:
 
     threshold: float = 0.25
     """Threshold of the coupling: off-axis over on-axis response of the worst axis."""
-    octaves: float = 1 / 12
+    averaged_octaves: float = 1 / 12
     """Width of the running average, in octaves."""
     neighbours: int = 8
-    """Number of lines on either side that the smoothing (a local polynomial of degree 2) uses. Chosen."""
+    """Number of lines on either side that the smoothing uses. Chosen."""
     draws: int = 200
     """Number of draws of the bootstrap. Chosen."""
     seed: int = 1
@@ -41,7 +43,7 @@ class OnsetRule:
         """Definition of the onset in words for reports, with width and threshold; a clause without a full stop."""
         return (
             f"lowest frequency at which the worst ratio of acceleration across to acceleration along, averaged over "
-            f"1/{1 / self.octaves:.3g} octave, passes {100 * self.threshold:g} %"
+            f"1/{1 / self.averaged_octaves:.3g} octave, passes {100 * self.threshold:g} %"
         )
 
 
@@ -54,7 +56,7 @@ class CouplingOnset:
     interval_hz: tuple[float, float] | None
     """95 % interval, from resampled noise plus half a line on either side for the line spacing; None without an onset,
     or where the noise is not known."""
-    from_the_start: bool
+    is_at_lowest_line: bool
     """Whether the averaged coupling exceeds the threshold at the lowest line above the noise: the onset may lie
     below."""
     threshold: float
@@ -70,7 +72,7 @@ def find_coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = No
     rule = rule or OnsetRule()
     require_square_response(response.response)
     lines = response.select_lines(response.reliable)
-    smoother = LocalPolynomial.from_response(lines, rule.neighbours, 2)
+    smoother = LocalPolynomial.from_response(lines, rule.neighbours, _SMOOTHING_ORDER)
     smoothed_response = smoother.apply(lines.response)
     is_above_noise = _mark_lines_above_noise(lines, smoother, smoothed_response, rule)
     if not is_above_noise.any():
@@ -120,7 +122,7 @@ def _mark_lines_above_noise(
 def _find_onset(frequency_hz: FloatArray, coupling: FloatArray, rule: OnsetRule) -> float | None:
     """Find the frequency (Hz) at which the running mean of the coupling first exceeds the threshold; None where it
     never does."""
-    mean_coupling = _average_over_octaves(frequency_hz, coupling, rule.octaves)
+    mean_coupling = _average_over_octaves(frequency_hz, coupling, rule.averaged_octaves)
     lines_above = np.flatnonzero(mean_coupling > rule.threshold)
     return (
         _interpolate_crossing(frequency_hz, mean_coupling, int(lines_above[0]), rule.threshold)
@@ -157,7 +159,7 @@ def _bootstrap_onsets(
 ) -> FloatArray:
     """Draw onsets (draws,), in Hz, of a parametric bootstrap: noise of the measured variance is added to the smoothed
     curve. A curve without an onset counts as its highest frequency."""
-    smoother = LocalPolynomial.from_response(lines, rule.neighbours, 2)
+    smoother = LocalPolynomial.from_response(lines, rule.neighbours, _SMOOTHING_ORDER)
     component_sd = np.sqrt(lines.noise_variance / 2)
     generator = np.random.default_rng(rule.seed)
     onsets_hz = []

@@ -68,13 +68,19 @@ def judge_lines(
     return LineReliability(~(is_below_spring | is_unexcited | is_noisy), tuple(remarks))
 
 
-def find_excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
+def find_excited_lines(
+    frequency_hz: FloatArray, excitation: ComplexArray, units: Sequence[str], least_energy_db: float
+) -> BoolArray:
     """Find the lines at which the excitations span as many directions as there are inputs.
 
-    excitation: spectra (lines, inputs, experiments), at least as many experiments as inputs. Returns a mask (lines,):
-    where the smallest singular value of the excitations with at least `least_energy_db` of energy
+    excitation: spectra (lines, inputs, experiments), at least as many experiments as inputs. units: of the inputs;
+    the inputs of each unit, such as N and N m, are scaled to an rms of 1, so that they can be compared. Returns a
+    mask (lines,): where the smallest singular value of the excitations with at least `least_energy_db` of energy
     (`ReliabilityRules`), each of unit length, exceeds `_MIN_INDEPENDENCE`.
     """
+    has_same_unit = np.equal.outer(units, units)
+    input_power = has_same_unit @ np.mean(np.abs(excitation) ** 2, axis=(0, 2)) / has_same_unit.sum(axis=1)
+    excitation = excitation / np.sqrt(np.maximum(input_power, np.finfo(np.float64).tiny))[:, None]
     least_power = 10 ** (least_energy_db / 10)
     power = np.sum(np.abs(excitation) ** 2, axis=1)
     power_per_octave = power * frequency_hz[:, None]

@@ -147,7 +147,10 @@ def _join_groups(
     order = np.argsort(np.concatenate([group.frequency_hz for group in groups]))
     frequency_hz = np.concatenate([group.frequency_hz for group in groups])[order]
     excited = np.concatenate(
-        [find_excited_lines(group.frequency_hz, group.excitation, settings.rules.least_energy_db) for group in groups]
+        [
+            find_excited_lines(group.frequency_hz, group.excitation, command.units, settings.rules.least_energy_db)
+            for group in groups
+        ]
     )[order]
     coherence = np.concatenate([group.coherence for group in groups])[order]
     spring_hz = find_spring_frequency_hz([recording.meta for recording in recordings])

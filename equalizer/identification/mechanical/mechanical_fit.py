@@ -47,6 +47,7 @@ from equalizer.identification.mechanical.modal_order import balance_fit, choose_
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.identification.mechanical.physical_model import make_physical_model
 from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.isolated_samples import interpolate_isolated_samples
 from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import find_unit_system
 
@@ -138,11 +139,13 @@ def fit_mechanical_model(
     Response i should be the motion at the point and in the direction of command i (else see
     `MechanicalFitSettings.noncollocated_sensors`); further responses may be at any place. on_progress: called with the
     share done, 0 to 1. Raises MechanicalFitError where the recordings do not determine a model: unsuitable channels,
-    too few driven lines, only noise, or an unstable fit. The exceptions of `refine_unknowns` escape too.
+    too few driven lines, only noise, or an unstable fit; MechanicalModelError and LinAlgError
+    where a starting point is no valid model (`refine_unknowns`).
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
+    recordings, interpolation_remarks = zip(*map(interpolate_isolated_samples, recordings), strict=True)
     fit_segments, test_segments = split_fit_and_test(recordings)
     fit_lines = [spectra for pair in fit_segments if (spectra := compute_segment_lines(*pair)) is not None]
     segments = select_band(fit_lines, settings.band_hz)
@@ -168,7 +171,10 @@ def fit_mechanical_model(
         band_hz=band_hz,
         candidates=choice.candidates,
         reason=choice.reason,
-        remarks=_list_remarks(final, recordings[0].response.channels, bool(test_lines)),
+        remarks=(
+            *_list_remarks(final, recordings[0].response.channels, bool(test_lines)),
+            *filter(None, interpolation_remarks),
+        ),
     )
 
 

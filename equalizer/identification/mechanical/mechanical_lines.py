@@ -73,6 +73,9 @@ SMOOTHING_LINES = 9
 """Number of lines over which the noise power between periods and, with a transient, the excitation power are averaged.
 Chosen."""
 
+HANN_POWER = 0.375
+"""Mean square of a Hann window: the share of a steady signal's power that it leaves."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SegmentLines:
@@ -105,7 +108,8 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
     transient = length != segment.period or starts == [segment.start]
     spectra = [_compute_spectra(signal.samples, starts, length) for signal in (recording.command, recording.response)]
     excitation = recording.command if recording.excitation is None else recording.excitation
-    excitation_norm = np.linalg.norm(_compute_spectra(excitation.samples, starts, length).mean(axis=0), axis=1)
+    excitation_spectra = _compute_spectra(excitation.samples, starts, length, tapered=transient)
+    excitation_norm = np.linalg.norm(excitation_spectra.mean(axis=0), axis=1)
     if not excitation_norm.max() > 1e-9 * max(
         float(np.nanmax(np.abs(excitation.samples[segment.start : segment.stop]))), 1e-300
     ):
@@ -220,8 +224,16 @@ def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[in
     return ([start] if length > 0 else []), length
 
 
-def _compute_spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
+def _compute_spectra(samples: FloatArray, starts: Sequence[int], length: int, tapered: bool = False) -> ComplexArray:
     """Compute the spectra (periods, lines, channels) of the samples without the mean of each period, one period per
-    start."""
-    periods = np.stack([samples[start : start + length] for start in starts])
-    return compute_line_spectra(periods - periods.mean(axis=1, keepdims=True))
+    start. tapered: whether to apply a Hann window, so that ends that differ are no excitation of all lines (leakage);
+    not where that would remove most of the power, such as that of a pulse near an end. Those of a constant channel are
+    exactly 0."""
+    periods = np.stack([samples[start : start + length] - samples[start] for start in starts])
+    centred_periods = periods - periods.mean(axis=1, keepdims=True)
+    if tapered:
+        window = np.hanning(length)[:, None]
+        tapered_periods = (periods - np.sum(window * periods, axis=1, keepdims=True) / window.sum()) * window
+        if np.sum(tapered_periods**2) > HANN_POWER / 2 * np.sum(centred_periods**2):
+            return compute_line_spectra(tapered_periods)
+    return compute_line_spectra(centred_periods)

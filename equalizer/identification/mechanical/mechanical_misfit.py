@@ -215,13 +215,18 @@ def compute_numerical_jacobian(
 
 def _compute_line_weights(segment: SegmentLines, floor: float) -> FloatArray:
     """Compute the weights (lines, p), 1 / sqrt(noise + floor² |response|²), with |response|² averaged over five lines
-    (chosen); 0 at lines that are not excited, and of a channel that is zero throughout. Noise that is not known (NaN)
-    counts as 0; a small constant avoids a division by zero."""
+    (chosen); 0 at lines that are not excited, and of a channel that is zero throughout. Such a channel whose own
+    command is zero too is not coupled to the others: its |response|² counts as the largest of any channel. Noise that
+    is not known (NaN) counts as 0; a small constant avoids a division by zero."""
     power = np.abs(segment.response) ** 2
+    is_uncoupled, inputs = np.asarray(~power.any(axis=0)), segment.command.shape[1]
+    is_uncoupled[:inputs] &= ~segment.command.any(axis=0)
+    is_uncoupled[inputs:] = False  # without a command of their own
+    power = np.where(is_uncoupled, power.max(axis=1, keepdims=True, initial=0.0), power)
     smoothed_power = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
     floor_power = 1e-12 * power.max(axis=0, initial=0.0) + 1e-300
-    is_weighted = segment.excited[:, None] & (power.max(axis=0, initial=0.0) > 0)
+    is_weighted = segment.excited[:, None] & power.any(axis=0)
     return np.asarray(is_weighted / np.sqrt(noise + floor**2 * smoothed_power + floor_power))
 
 

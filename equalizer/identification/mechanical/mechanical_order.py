@@ -42,6 +42,18 @@ JOINT_START_RATIOS = (1.1, 1.6)
 """Starting frequencies of the joint's resonance, relative to the band's upper end."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    """Limits of the extensions that `_fit_extensions` may try."""
+
+    most_modes: int
+    """Largest number of modes in addition to the driven axes."""
+    fit_delay: bool
+    """Whether a delay is tried."""
+    extend_couplings: bool
+    """Whether a structure with several inputs may get a delay, a sensor rotation and shared sensors."""
+
+
 def grow_by_stages(
     groups: Sequence[LineGroup],
     best: RefinedFit[Structure],
@@ -75,18 +87,6 @@ def grow_by_stages(
     return best, tuple(trials), reason
 
 
-@dataclass(frozen=True, slots=True)
-class _Limits:
-    """Limits of the extensions that `_fit_extensions` may try."""
-
-    most_modes: int
-    """Largest number of modes in addition to the driven axes."""
-    fit_delay: bool
-    """Whether a delay is tried."""
-    extend_couplings: bool
-    """Whether a structure with several inputs may get a delay, a sensor rotation and shared sensors."""
-
-
 def compute_stage_ends(band_hz: tuple[float, float]) -> tuple[float, ...]:
     """Compute the upper ends (Hz) of the growing band, in equal ratios of at most `STAGE_RATIO`; the last is that of
     the band."""
@@ -114,7 +114,7 @@ def _grow_structure(
     groups: Sequence[LineGroup],
     best: RefinedFit[Structure],
     band_hz: tuple[float, float],
-    limits: "_Limits",
+    limits: _Limits,
     trials: list[OrderCandidate],
 ) -> tuple[RefinedFit[Structure], str]:
     """Adopt larger structures while they improve the fit enough in this band, and record all trials in `trials`.

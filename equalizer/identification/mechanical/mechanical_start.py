@@ -33,6 +33,8 @@ _REWEIGHTINGS = 10
 four or five suffice on simulated devices."""
 _MAX_DELAY_CYCLES = 8.0
 """Longest trial delay, in periods of the highest line of the first segment. Chosen."""
+_LEAST_ERROR_SHARE = 1e-6
+"""Least expected error of a line, relative to that of any other: without a command it is 0. Chosen."""
 
 
 def estimate_rigid_starts(
@@ -185,7 +187,8 @@ def _compute_weights(spectra: SegmentLines, m: int, floor: float, force_noise: F
         noise_ratio = np.sqrt(np.nan_to_num(spectra.noise[:, :m]).sum(axis=1)) / np.maximum(response_norm, 1e-300)
         force_noise = np.repeat(command_norm * noise_ratio[:, None], m, axis=1)
     expected_error = np.hypot(5 * floor * command_norm, force_noise)
-    return np.asarray(spectra.excited[:, None] / np.maximum(expected_error, 1e-300))
+    least_error = max(_LEAST_ERROR_SHARE * float(expected_error.max(initial=0.0)), 1e-300)
+    return np.asarray(spectra.excited[:, None] / np.maximum(expected_error, least_error))
 
 
 def list_triangle_pairs(m: int) -> list[tuple[int, int]]:

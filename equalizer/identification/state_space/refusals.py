@@ -21,6 +21,8 @@ LARGEST_GAP_OCTAVES = 0.1
 """Gap without a line, in octaves, above which a model is refused, if `LARGEST_GAP_SPACINGS` is exceeded too."""
 LARGEST_GAP_SPACINGS = 3.0
 """Gap, in median line spacings, above which a model is refused, if `LARGEST_GAP_OCTAVES` is exceeded too."""
+SWEEP_START_RATIO, SWEEP_END_RATIO = 1 / 1.1, 1.06
+"""Start and end of the sweep that a message suggests, relative to the ends of the band. Chosen."""
 
 
 class IdentificationError(ValueError):
@@ -89,8 +91,8 @@ def _refuse_zero_outputs(responses: Sequence[FrequencyResponse], settings: Ident
 def _refuse_empty_band(
     responses: Sequence[FrequencyResponse], lines: WeightedLines, settings: IdentificationSettings
 ) -> None:
-    """Raise IdentificationError without any line to fit, and for a gap (`_refuse_gap`); the message suggests a sweep
-    with the margins stated there."""
+    """Raise IdentificationError without any line to fit, and for a gap (`_refuse_gap`). The message suggests a
+    sweep."""
     low_hz, high_hz = settings.band_hz
     measured_count = sum(len(estimate.select_band(low_hz, high_hz)) for estimate in responses)
     if not len(lines):
@@ -98,14 +100,19 @@ def _refuse_empty_band(
         problem = "none of its lines is reliable" if measured_count else "no line was excited there"
         raise IdentificationError(
             f"no data in {low_hz:g} to {high_hz:g} Hz: {problem}{f' ({reasons})' if reasons else ''}; "
-            f"record a sweep from {low_hz / 1.1:.3g} to {high_hz * 1.06:.3g} Hz"
+            f"record {_describe_sweep(settings)}"
         )
     _refuse_gap(lines, settings)
 
 
+def _describe_sweep(settings: IdentificationSettings) -> str:
+    low_hz, high_hz = settings.band_hz
+    return f"a sweep from {low_hz * SWEEP_START_RATIO:.3g} to {high_hz * SWEEP_END_RATIO:.3g} Hz"
+
+
 def _refuse_gap(lines: WeightedLines, settings: IdentificationSettings) -> None:
     """Raise IdentificationError for a gap wider than `LARGEST_GAP_OCTAVES` and `LARGEST_GAP_SPACINGS`, in which the
-    data do not determine the model. The message suggests a sweep with margins of 10 % below and 6 % above (chosen)."""
+    data do not determine the model. The message suggests a sweep."""
     low_hz, high_hz = settings.band_hz
     edges_hz = np.clip(np.concatenate([[low_hz], lines.frequency_hz, [high_hz]]), low_hz, high_hz)
     gap_octaves, gap_hz = np.diff(np.log2(edges_hz)), np.diff(edges_hz)
@@ -122,7 +129,7 @@ def _refuse_gap(lines: WeightedLines, settings: IdentificationSettings) -> None:
     )
     raise IdentificationError(
         f"between {below_hz:.3g} and {above_hz:.3g} Hz no line can be used, but the band is {low_hz:g} to {high_hz:g} "
-        f"Hz; record a sweep from {low_hz / 1.1:.3g} to {high_hz * 1.06:.3g} Hz, or choose a band that the lines cover "
+        f"Hz; record {_describe_sweep(settings)}, or choose a band that the lines cover "
         f"({covered_low_hz:.3g} to {covered_high_hz:.3g} Hz)"
     )
 

@@ -237,7 +237,7 @@ class BandedEqualizer:
             return np.zeros((len(middle_response), self.middle.B.shape[1]))
         planned_motions = [self._plan_motion(middle_response, CORNER_HZ)] + ([] if motion is None else [motion])
         force: FloatArray = -sum(
-            (k * motion_part.position_m + b * motion_part.velocity_m_s for motion_part in planned_motions), np.zeros(())
+            (k * motion_part.position_m + b * motion_part.velocity_mps for motion_part in planned_motions), np.zeros(())
         )
         return force
 
@@ -253,4 +253,4 @@ class BandedEqualizer:
             )
             return low_acceleration, middle_acceleration, high_acceleration
         zeros = np.zeros_like(middle_response)
-        return zeros if motion is None else motion.acceleration, middle_response, zeros
+        return zeros if motion is None else motion.acceleration_mps2, middle_response, zeros

@@ -28,9 +28,9 @@ class SlowMotion:
     position, the acceleration that of the velocity."""
 
     position_m: FloatArray
-    velocity_m_s: FloatArray
-    acceleration: FloatArray
-    """m/s²: the reference acceleration after the high-pass filter."""
+    velocity_mps: FloatArray
+    acceleration_mps2: FloatArray
+    """The reference acceleration after the high-pass filter."""
 
     @property
     def travel_m(self) -> float:
@@ -80,7 +80,7 @@ def compute_low_band_forces(motion: SlowMotion, rigid: RigidModel, sample_rate_h
     """Compute forces (N, m) in N by inverse dynamics along the motion, advanced by the rigid model's delay and the half
     sample of the hold, to first order (Taylor), which is enough for a slow band."""
     lead_s = rigid.delay_s + 0.5 / sample_rate_hz
-    x, v, a = motion.position_m, motion.velocity_m_s, motion.acceleration
+    x, v, a = motion.position_m, motion.velocity_mps, motion.acceleration_mps2
     lead_position, lead_velocity = x + lead_s * v, v + lead_s * a
     lead_acceleration = a + lead_s * np.gradient(a, 1 / sample_rate_hz, axis=0) if len(a) > 1 else a
     force: FloatArray = (

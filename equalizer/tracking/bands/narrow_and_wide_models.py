@@ -121,7 +121,9 @@ def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: Fee
     forces = middle_forces + outer_forces
     predicted = simulate_from_rest(problem, forces)
     low_reference = (
-        np.zeros_like(in_band_reference) if banded_forces.motion is None else banded_forces.motion.acceleration[rows]
+        np.zeros_like(in_band_reference)
+        if banded_forces.motion is None
+        else banded_forces.motion.acceleration_mps2[rows]
     )
     total_reference = low_reference + (banded_forces.bands.middle + banded_forces.bands.high)[rows]
     solution = Feedforward(

@@ -24,12 +24,12 @@ from equalizer.tracking.compensation.effect_roles import compute_lead_s, explain
 from equalizer.tracking.compensation.known_forces import (
     LAWS,
     ForceLaw,
-    compute_deadband_share,
+    compute_deadband_describing_function,
     compute_equivalent_impedance,
 )
 from equalizer.tracking.compensation.law_compensation import (
     compute_compensating_force,
-    compute_linear_share,
+    compute_describing_function,
     invert_command_map,
     make_single_axis_law,
 )
@@ -105,9 +105,9 @@ def compensate(
         elif effect.law is not None and not _is_force_law(effect):
             _compensate_command_map(effect.law, scaled_forces, compensating_forces, axis, identified_with_n)
     added_forces = scaled_forces + compensating_forces - forces
-    scale = 1.0 if cap_n is None else find_largest_share(forces, added_forces, cap_n)
+    share = 1.0 if cap_n is None else find_largest_share(forces, added_forces, cap_n)
     not_used = tuple((effect, reason) for effect, reason in effect_reasons if reason)
-    return Compensation(forces + scale * added_forces, compensated_effects, not_used, scale)
+    return Compensation(forces + share * added_forces, compensated_effects, not_used, share)
 
 
 def convert_motion_to_axes(motion: PlannedMotion, to_axes: FloatArray) -> PlannedMotion:
@@ -244,10 +244,10 @@ def _compensate_command_map(
     identified_with_n: float | None,
 ) -> None:
     """Change column `axis` of both arrays (N, m), N, in place, so that a command map (a discovered law) turns their sum
-    into the intended force: scale scaled_forces by the linear share of the map at the amplitude identified_with_n
+    into the intended force: scale scaled_forces by the map's describing function at the amplitude identified_with_n
     (unless None), and add to compensating_forces the command minus the intended force."""
     if identified_with_n is not None:
-        scaled_forces[:, axis] *= compute_linear_share(law, identified_with_n)
+        scaled_forces[:, axis] *= compute_describing_function(law, identified_with_n)
     intended_n = scaled_forces[:, axis] + compensating_forces[:, axis]
     slip_n = SMOOTHING_SHARE * float(np.sqrt(np.mean(intended_n**2)))
     compensating_forces[:, axis] += invert_command_map(law, intended_n, slip_n) - intended_n
@@ -265,7 +265,7 @@ def _compensate_deadband(
     zero. scaled_forces is first scaled as in `_compensate_command_map`. Intended forces below the jump, which no
     command gives, are not played."""
     if identified_with_n is not None:
-        scaled_forces[:, axis] *= compute_deadband_share(parameters, identified_with_n)
+        scaled_forces[:, axis] *= compute_deadband_describing_function(parameters, identified_with_n)
     intended_n = scaled_forces[:, axis] + compensating_forces[:, axis]
     rms_n = float(np.sqrt(np.mean(intended_n**2)))
     if rms_n > 0:

@@ -140,7 +140,7 @@ def apply_deadband(parameters: Mapping[str, float], command: FloatArray) -> Floa
     return np.asarray(np.where(is_outside, command - (1.0 - jump) * width * np.sign(command), 0.0))
 
 
-def compute_deadband_share(parameters: Mapping[str, float], amplitude: float) -> float:
+def compute_deadband_describing_function(parameters: Mapping[str, float], amplitude: float) -> float:
     """Compute the describing function of a dead band: the share of a sinusoid's fundamental that passes, 0 for an
     amplitude (N, above zero) up to the width. With s = width / amplitude it is 1 - 2/pi (arcsin s + s sqrt(1 - s^2)) of
     the dead zone, and 4/pi jump s sqrt(1 - s^2) of the jump (relay with dead zone; Gelb and Vander Velde, 1968,

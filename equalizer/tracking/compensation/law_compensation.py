@@ -24,7 +24,7 @@ from equalizer.tracking.feedforward.planned_motion import PlannedMotion
 
 TABLE_SIZE = 2001
 """Number of commands in the table by which a command map is inverted; also samples of the cycle in
-`compute_linear_share`. Chosen."""
+`compute_describing_function`. Chosen."""
 FIRST_RANGE_RATIO = 2.0
 """First range of that table, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
 _MOST_DOUBLINGS = 3
@@ -102,7 +102,7 @@ def make_single_axis_law(law: Law, axis_letters: tuple[str, ...], axis: int) -> 
     return compute_opposing_force
 
 
-def compute_linear_share(law: Law, amplitude: float) -> float:
+def compute_describing_function(law: Law, amplitude: float) -> float:
     """Compute the describing function N(A) of a command map g for the command A sin(p): the gain of the fundamental,
 
         N(A) = 1 / (pi A) integral over 0 to 2 pi of g(A sin p) sin p dp

@@ -19,6 +19,7 @@ from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSpli
 from equalizer.tracking.feedforward.periodic_inverse import check_reference
 from equalizer.tracking.lqr.constrained import CapSettings, TrackingLoss, track_under_cap
 from equalizer.tracking.lqr.limits import ForcePeaks, find_force_peaks, require_under_cap
+from equalizer.tracking.lqr.lqr import require_stable
 from equalizer.tracking.lqr.padding import CAUSAL, compute_band_error, simulate_from_rest, track_padded
 from equalizer.tracking.lqr.tracking_problem import (
     TrackingError,
@@ -97,8 +98,9 @@ def compute_feedforward_forces(
     Finite-horizon LQR tracking from rest, which equals least squares with the block-Toeplitz matrix of the impulse
     response and a weight on the forces. reference: (N, p), m/s²; settings: None = defaults. Raises ForceLimitError for
     forces above the cap (with `constrain` off), TrackingError where the reference has no content in the band or the cap
-    cannot be kept, or for an invalid weight or a reference with values that are not finite, ValueError for an invalid
-    cap, where sample rate, channels or units are not the model's, and for a model whose commands are not in N.
+    cannot be kept, or for an unstable model, an invalid weight or a reference with values that are not finite,
+    ValueError for an invalid cap, where sample rate, channels or units are not the model's, and for a model whose
+    commands are not in N.
     """
     settings = settings or FeedforwardSettings()
     check_reference(model, reference)
@@ -153,8 +155,9 @@ def solve_causally(
 ) -> tuple[FloatArray, TrackingLoss | None]:
     """Solve for forces (N, m), in newtons, that are zero before the first row; and the loss due to the cap, None where
     the forces did not have to be constrained. With `settings.constrain`, the sum of the forces and other_forces (N, m)
-    is kept under the cap; otherwise the cap is not applied here. reference: (N, p), m/s². Raises TrackingError as
-    `track_padded` and `track_under_cap`."""
+    is kept under the cap; otherwise the cap is not applied here. reference: (N, p), m/s². Raises TrackingError for an
+    unstable model, and as `track_padded` and `track_under_cap`."""
+    require_stable(problem, "its motion would grow without a force; identify it again")
     unconstrained_forces = track_padded(problem, reference, CAUSAL).forces
     total_forces = unconstrained_forces if other_forces is None else unconstrained_forces + other_forces
     if not settings.constrain or find_force_peaks(total_forces, settings.cap_n).is_under_cap:

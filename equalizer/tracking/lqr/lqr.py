@@ -108,7 +108,7 @@ def compute_periodic_state(problem: TrackingProblem, forces: FloatArray) -> Floa
     """Compute the state (n,) at the first row of forces (T, m), N, that repeat with period T, in the steady state. A
     fade-in that ends in this state continues into the periodic forces without a transient
     (`feedforward.model_equalizer`). Raises TrackingError for an unstable model."""
-    _require_stable(problem, "repeated forces lead to no periodic state")
+    require_stable(problem, "repeated forces lead to no periodic state")
     x = np.zeros(problem.order)
     for force in np.asarray(forces, dtype=np.float64):
         x = problem.A @ x + problem.B @ force
@@ -121,11 +121,11 @@ def compute_free_decay_weight(problem: TrackingProblem) -> FloatArray:
     A and Q½ C. A final state that differs by d from the intended state causes, with the intended forces from then on
     (zero after a transient, periodic after a fade-in), output errors with the cost d' P_N d. Raises TrackingError for
     an unstable model."""
-    _require_stable(problem, "the motion after the end does not decay")
+    require_stable(problem, "the motion after the end does not decay")
     return np.asarray(solve_discrete_lyapunov(problem.A.T, problem.C.T @ problem.Q @ problem.C))
 
 
-def _require_stable(problem: TrackingProblem, consequence: str) -> None:
+def require_stable(problem: TrackingProblem, consequence: str) -> None:
     """Check that all eigenvalues of A are within the unit circle. Raises TrackingError, whose text ends with
     `consequence`."""
     spectral_radius = float(np.abs(np.linalg.eigvals(problem.A)).max(initial=0.0))

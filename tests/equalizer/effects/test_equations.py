@@ -5,6 +5,7 @@ Runge-Kutta steps of the equation written out anew, none of which calls the law'
 steep tanh there; what sticks is in tests/contracts/test_effect_recovery.py, from event to event.
 """
 
+from math import exp, pi, sin, tanh
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,12 @@ from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 
 MASS, DAMPING, STIFFNESS = 0.3, 2.0, 150.0
-PARTS = 50
-"""Steps of the other integrator per millisecond."""
+PARTS, PARTS_OF_A_JUMP = 5, 25
+"""Steps of the other integrator per millisecond; and where the force turns with the sign of the speed."""
+JUMPS = {
+    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "position_dependent_friction",
+    "presliding_hysteresis",
+}  # fmt: skip
 SHARP = 2e-4
 """m/s in which the other integrator's sign turns: well below the speeds that are played."""
 
@@ -33,7 +38,7 @@ class Now(NamedTuple):
 
 
 def sign(v):
-    return np.tanh(v / SHARP)
+    return tanh(v / SHARP)
 
 
 def above(x, place):
@@ -53,21 +58,21 @@ LAWS = {
     "hardening_stiffness": lambda at, k3: -k3 * at.x**3,
     "asymmetric_stiffness": lambda at, k2: -k2 * at.x**2,
     "constant_force": lambda at, force: force,
-    "gravity_torque": lambda at, torque, angle: -torque * np.sin(at.x + angle),
-    "cogging": lambda at, amplitude, pitch, phase: amplitude * np.sin(2 * np.pi * at.x / pitch + phase),
+    "gravity_torque": lambda at, torque, angle: -torque * sin(at.x + angle),
+    "cogging": lambda at, amplitude, pitch, phase: amplitude * sin(2 * pi * at.x / pitch + phase),
     "end_stop": lambda at, position, stiffness, opposite: (
         -stiffness * (above(at.x, position) - opposite * above(-at.x, position))
     ),
     "pose_dependent_inertia": pose_dependent,
     "time_varying_grip": lambda at, rate_hz, depth, phase, stiffness_share: (
-        -depth * np.sin(2 * np.pi * rate_hz * at.t + phase) * (DAMPING * at.v + stiffness_share * STIFFNESS * at.x)
+        -depth * sin(2 * pi * rate_hz * at.t + phase) * (DAMPING * at.v + stiffness_share * STIFFNESS * at.x)
     ),
     "coulomb_friction": lambda at, level: -level * sign(at.v),
     "asymmetric_friction": lambda at, level_positive, level_negative: (
         -(level_positive if at.v > 0 else level_negative) * sign(at.v)
     ),
     "stribeck_friction": lambda at, coulomb, static, speed: (
-        -(coulomb + (static - coulomb) * np.exp(-((at.v / speed) ** 2))) * sign(at.v)
+        -(coulomb + (static - coulomb) * exp(-((at.v / speed) ** 2))) * sign(at.v)
     ),
     "position_dependent_friction": lambda at, level, slope_per_m, bend_per_m2: (
         -max(level * (1 + slope_per_m * at.x + bend_per_m2 * at.x**2), 0.0) * sign(at.v)
@@ -94,24 +99,30 @@ def pushed() -> np.ndarray:
 
 def solved(name: str, values: dict[str, float], force: np.ndarray) -> np.ndarray:
     """(n,): velocities at the samples, by Runge-Kutta steps of fourth order."""
-    step_s = 1e-3 / PARTS
+    parts = PARTS_OF_A_JUMP if name in JUMPS else PARTS
+    step_s = 1e-3 / parts
     bends = name == "presliding_hysteresis"
-    state, time_s, found = np.zeros(3), 0.0, []
+    state, time_s, found = (0.0, 0.0, 0.0), 0.0, []
 
     def rates(state, time_s, u):
         x, v, z = state
         at = Now(x, v, time_s, z, u - DAMPING * v - STIFFNESS * x)
         bristle = v - values["stiffness"] * abs(v) * z / values["level"] if bends else 0.0
-        return np.array([v, (at.pull + LAWS[name](at, **values)) / MASS, bristle])
+        return v, (at.pull + LAWS[name](at, **values)) / MASS, bristle
 
-    for u in force:
+    def moved(state, rate, by_s):
+        return tuple(value + by_s * slope for value, slope in zip(state, rate, strict=True))
+
+    for u in force.tolist():
         found.append(state[1])
-        for _ in range(PARTS):
+        for _ in range(parts):
             first = rates(state, time_s, u)
-            second = rates(state + step_s / 2 * first, time_s + step_s / 2, u)
-            third = rates(state + step_s / 2 * second, time_s + step_s / 2, u)
-            last = rates(state + step_s * third, time_s + step_s, u)
-            state, time_s = state + step_s / 6 * (first + 2 * second + 2 * third + last), time_s + step_s
+            second = rates(moved(state, first, step_s / 2), time_s + step_s / 2, u)
+            third = rates(moved(state, second, step_s / 2), time_s + step_s / 2, u)
+            last = rates(moved(state, third, step_s), time_s + step_s, u)
+            slopes = zip(first, second, third, last, strict=True)
+            mean = tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in slopes)
+            state, time_s = moved(state, mean, step_s), time_s + step_s
     return np.array(found)
 
 

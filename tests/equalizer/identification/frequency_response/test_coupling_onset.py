@@ -35,7 +35,7 @@ def test_the_crossing_of_the_threshold_is_found_between_the_lines():
     assert found.frequency_hz == pytest.approx(12.0, abs=0.01)
     assert found.interval_hz[0] < 12.0 < found.interval_hz[1]
     assert found.interval_hz[1] - found.interval_hz[0] < 0.05
-    assert not found.from_the_start
+    assert not found.is_at_lowest_line
 
 
 def test_a_bump_much_shorter_than_a_twelfth_of_an_octave_is_passed_over():
@@ -76,7 +76,7 @@ def test_all_lines_too_noisy_is_refused_with_what_would_do():
 
 def test_coupled_from_the_start_is_reported():
     found = find_coupling_onset(response_of(0.4 + 0 * LINES, LINES))
-    assert found.from_the_start
+    assert found.is_at_lowest_line
     assert found.frequency_hz == LINES[0]
 
 

@@ -115,6 +115,18 @@ def test_lines_outside_the_sweep_are_not_reliable(plants, synthetic):
     )
 
 
+def test_whether_all_directions_were_excited_does_not_depend_on_units(plants, synthetic):
+    """The third command is a torque at a lever of 5 mm: 0.005 N m count as much as 1 N."""
+    recording = synthetic.played(plants, random_multisines(plants), kind="multisine")
+    levers = recording.command.samples * [1.0, 1.0, 0.005]
+    torque = Signal(
+        levers, recording.sample_rate_hz, ("force", "force", "torque"), ("N", "N", "N m"), recording.command.channels
+    )
+    estimate, with_torque = (estimate_transfer((each,)) for each in (recording, replace(recording, command=torque)))
+    assert estimate.reliable.sum() > 100
+    np.testing.assert_array_equal(with_torque.reliable, estimate.reliable)
+
+
 def test_lines_that_drown_in_noise_are_not_reliable(plants, synthetic):
     estimate = estimate_transfer((synthetic.sweeps(plants, 1.0, 400.0, 5.0, periods=3, noise=20.0),))
     assert not estimate.reliable[estimate.frequency_hz < 2.0].any()

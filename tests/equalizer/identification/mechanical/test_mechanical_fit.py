@@ -96,15 +96,18 @@ def two_axes():
 def test_mass_damping_and_stiffness_are_recovered_from_any_quantity(quantity):
     model = fit_mechanical_model([single(quantity=quantity)]).model
     assert model.coordinates == 1
-    np.testing.assert_allclose(
-        [model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0]], [0.3, 2.0, 90.0], rtol=0.02
-    )
+    found = [model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0]]
+    np.testing.assert_allclose(found, [0.3, 2.0, 90.0], rtol=0.02)
 
 
-def test_the_error_on_what_was_kept_for_a_test_is_the_noise():
-    fit = fit_mechanical_model([single()])
-    assert fit.held_out == pytest.approx(0.01, rel=0.15)
-    assert fit.errors[0].held_out == fit.held_out
+@pytest.fixture(scope="module")
+def one_axis():
+    return fit_mechanical_model([single()])
+
+
+def test_the_error_on_what_was_kept_for_a_test_is_the_noise(one_axis):
+    assert one_axis.held_out == pytest.approx(0.01, rel=0.15)
+    assert one_axis.errors[0].held_out == one_axis.held_out
 
 
 def test_a_plant_without_a_spring_is_said_to_drift():
@@ -142,15 +145,15 @@ def test_what_was_tried_ends_with_the_reason_for_stopping(two_axes):
     assert "noise" in fit.reason
 
 
-def test_another_seed_gives_the_same_plant():
-    masses = [fit_mechanical_model([single(seed)]).model.mass[0, 0] for seed in (2, 3)]
+@pytest.mark.slow
+def test_another_seed_gives_the_same_plant(one_axis):
+    masses = [one_axis.model.mass[0, 0], fit_mechanical_model([single(2)]).model.mass[0, 0]]
     assert masses[0] != masses[1]
     np.testing.assert_allclose(masses, 0.3, rtol=0.02)
 
 
-def test_the_same_recording_gives_the_same_numbers_again():
-    one, two = (fit_mechanical_model([single()]).model for _ in range(2))
-    np.testing.assert_array_equal(one.mass, two.mass)
+def test_the_same_recording_gives_the_same_numbers_again(one_axis):
+    np.testing.assert_array_equal(fit_mechanical_model([single()]).model.mass, one_axis.model.mass)
 
 
 def test_a_sensor_that_counts_the_other_way_is_reported():
@@ -175,8 +178,7 @@ def test_sampled_responses_agree_with_stepping(two_axes):
     rng = np.random.default_rng(8)
     for quantity in ORDER:
         model = MechanicalModel("oracle", quantity, M, D, K, np.eye(3)[:, :2], np.eye(3)[:2])
-        commands = np.zeros((8000, 2))
-        commands[:, 0] = multisine(rng, 8)
+        commands = np.outer(multisine(rng, 8), [1.0, 0.0])
         settled = stepped(M, D, K, model.input, model.output, quantity, commands)[-1000:]
         lines = np.arange(2, 300)
         measured = np.fft.rfft(settled, axis=0)[lines] / np.fft.rfft(commands[-1000:, 0])[lines, None]
@@ -201,10 +203,8 @@ def test_a_whole_sample_of_delay_is_one_turn_of_z():
     lines = np.array([1.0, 70.0])
     late = replace(model, actuator=ActuatorLimits(delay_s=1 / RATE_HZ))
     for hold in Hold:
-        ratio = compute_sampled_response(late, lines, RATE_HZ, hold) / compute_sampled_response(
-            model, lines, RATE_HZ, hold
-        )
-        np.testing.assert_allclose(ratio[:, 0, 0], np.exp(-2j * np.pi * lines / RATE_HZ))
+        delayed, prompt = (compute_sampled_response(each, lines, RATE_HZ, hold) for each in (late, model))
+        np.testing.assert_allclose((delayed / prompt)[:, 0, 0], np.exp(-2j * np.pi * lines / RATE_HZ))
 
 
 def test_fits_have_no_pole_that_grows(two_axes):
@@ -227,7 +227,7 @@ def test_modes_that_the_sensor_sees_otherwise_are_fitted_by_shapes_of_their_own(
     np.testing.assert_allclose(fit.model.input[:, 0], np.eye(fit.model.coordinates)[0])
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 3))])
 def test_pure_noise_is_refused(seed):
     rng = np.random.default_rng(seed)
     source = recording(rng.standard_normal((4000, 1)), rng.standard_normal((4000, 1)))

@@ -1,7 +1,10 @@
 """Spectra of segments: which of them contain a transient."""
 
 import numpy as np
+import pytest
 
+from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings
 from equalizer.identification.mechanical.mechanical_lines import (
     compute_segment_lines,
     have_same_lines,
@@ -10,7 +13,7 @@ from equalizer.identification.mechanical.mechanical_lines import (
 )
 from equalizer.identification.mechanical.mechanical_misfit import add_scatter_noise
 from equalizer.signals.recording import Segment
-from tests.equalizer.identification.mechanical.test_mechanical_fit import multisine, recording
+from tests.equalizer.identification.mechanical.test_mechanical_fit import multisine, recording, stepped
 
 
 def test_only_complete_periods_after_the_first_are_without_a_transient():
@@ -54,3 +57,40 @@ def test_as_many_lines_are_not_the_same_lines():
     assert not have_same_lines(*lines)
     for before, after in zip(lines, add_scatter_noise(lines), strict=True):
         np.testing.assert_array_equal(after.noise, before.noise)
+
+
+@pytest.mark.parametrize("at_rest", [0.0, 9.81])
+def test_axes_recorded_one_at_a_time_are_uncoupled_where_the_other_sensor_does_not_move(at_rest):
+    """As encoders of an x-y stage do: the channel of the axis that is not driven is exactly constant."""
+    rng, recordings, mass = np.random.default_rng(5), [], np.diag([0.3, 0.25])
+    damping, stiffness = np.diag([2.0, 3.0]), np.diag([120.0, 90.0])
+    for axis in (0, 1):
+        command = np.zeros((4000, 2))
+        command[:, axis] = multisine(rng, 4)
+        response = stepped(mass, damping, stiffness, np.eye(2), np.eye(2), "acceleration", command)
+        response[:, axis] += 0.01 * response[:, axis].std() * rng.standard_normal(4000)
+        response[:, 1 - axis] = at_rest
+        recordings.append(recording(command, response))
+    fit = fit_mechanical_model(recordings, MechanicalFitSettings(most_modes=1))
+    np.testing.assert_allclose(fit.model.mass, mass, atol=0.003)
+    np.testing.assert_allclose(fit.model.damping, damping, atol=0.1)
+    assert fit.error < 0.02
+
+
+@pytest.mark.parametrize("offset", [0.0, 20.0])
+def test_lines_to_which_the_command_only_leaks_are_not_excited(offset):
+    samples, random = 6000, np.random.default_rng(3)
+    spectrum, lines_hz = np.fft.rfft(random.standard_normal(samples)), np.fft.rfftfreq(samples, 1 / 500)
+    command = np.fft.irfft(np.where((lines_hz > 5) & (lines_hz < 40), spectrum, 0.0), samples)[:, None] + offset
+    part = Segment(0, 4001, "noise")
+    lines = compute_segment_lines(recording(command, command, segments=(part,)), part)
+    excited_hz = lines.frequency_hz[lines.excited]
+    assert 4.0 < excited_hz[0] < 5.5
+    assert 39.5 < excited_hz[-1] < 42.0
+
+
+def test_a_pulse_at_the_beginning_excites_all_lines():
+    command = np.zeros((3000, 1))
+    command[1] = 1.0
+    part = Segment(0, 3000, "tap")
+    assert compute_segment_lines(recording(command, command, segments=(part,)), part).excited.all()

@@ -60,3 +60,27 @@ def test_lines_without_a_command_of_their_own_do_not_outweigh_all_others(seed):
     fitted = [matrix.item() for matrix in (found.model.mass, found.model.damping, found.model.stiffness)]
     assert fitted == pytest.approx([mass, damping, stiffness], rel=0.02)
     assert not any("opposite" in remark for remark in found.remarks)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3, 9))
+def test_neither_leakage_nor_spikes_of_the_sensor_prevent_a_model(seed):
+    """Noise of 2 to 40 Hz without a period leaks to other lines. Spikes: 0.3 % of the samples, tenfold the motion."""
+    random, rate_hz, samples = np.random.default_rng(seed), 1000.0, 30000
+    spectrum, lines_hz = np.fft.rfft(random.standard_normal(samples)), np.fft.rfftfreq(samples, 1 / rate_hz)
+    command = np.fft.irfft(np.where((lines_hz > 2) & (lines_hz < 40), spectrum, 0.0), samples)
+    command /= command.std()
+    a, b = np.array([[0.0, 1.0], [-3600.0, -4.8]]), np.array([[0.0], [4.0]])
+    speed = dlsim(cont2discrete((a, b, np.array([[0.0, 1.0]]), np.zeros((1, 1))), 1 / rate_hz), command)[1][:, 0]
+    is_spike = random.random(samples) < 0.003
+    readings = speed + speed.std() * (0.01 + 10 * is_spike) * random.standard_normal(samples)
+    found = fit_mechanical_model(
+        Recording(
+            "plant",
+            Signal(command[:, None], rate_hz, "force", "N", ("fx",)),
+            Signal(readings[:, None], rate_hz, "velocity", "m/s", ("r",)),
+        )
+    )
+    fitted = [matrix.item() for matrix in (found.model.mass, found.model.damping, found.model.stiffness)]
+    assert fitted == pytest.approx([0.25, 1.2, 900.0], rel=0.01)
+    assert "Isolated samples" in found.remarks[-1]

@@ -19,9 +19,9 @@ def slow(plants):
 def test_position_velocity_and_acceleration_are_one_motion(plan, slow):
     motion = plan(slow, RATE_HZ)
     velocity = np.gradient(motion.position_m, 1 / RATE_HZ, axis=0)
-    acceleration = np.gradient(motion.velocity_m_s, 1 / RATE_HZ, axis=0)
-    assert np.abs(velocity - motion.velocity_m_s).max() < 2e-4 * np.abs(velocity).max()
-    assert np.abs(acceleration - motion.acceleration).max() < 2e-4 * np.abs(acceleration).max()
+    acceleration = np.gradient(motion.velocity_mps, 1 / RATE_HZ, axis=0)
+    assert np.abs(velocity - motion.velocity_mps).max() < 2e-4 * np.abs(velocity).max()
+    assert np.abs(acceleration - motion.acceleration_mps2).max() < 2e-4 * np.abs(acceleration).max()
     assert motion.travel_m == pytest.approx(np.linalg.norm(motion.position_m, axis=1).max())
 
 
@@ -30,7 +30,7 @@ def test_position_velocity_and_acceleration_are_one_motion(plan, slow):
 def test_the_corner_takes_the_stated_share(plan, frequency_hz):
     t = np.arange(20000) / RATE_HZ
     motion = plan(np.sin(2 * np.pi * frequency_hz * t)[:, None], RATE_HZ, 0.5)
-    middle = motion.acceleration[5000:15000, 0]
+    middle = motion.acceleration_mps2[5000:15000, 0]
     played = 2 * np.exp(-2j * np.pi * frequency_hz * t[5000:15000]) @ middle / 10000 * 1j
     share = frequency_hz**2 / (frequency_hz**2 + 0.25)
     lead = 0.0 if plan is plan_motion else 2 * np.arctan(0.5 / frequency_hz)
@@ -43,7 +43,7 @@ def test_the_synthetic_device_plays_the_planned_acceleration(plants, slow):
     rigid = fit_rigid_model(lines, device.response(lines), RATE_HZ)
     motion = plan_motion(slow, RATE_HZ, 0.1)
     played = device.play(compute_low_band_forces(motion, rigid, RATE_HZ))
-    assert np.linalg.norm(played - motion.acceleration) < 0.01 * np.linalg.norm(slow)
+    assert np.linalg.norm(played - motion.acceleration_mps2) < 0.01 * np.linalg.norm(slow)
     assert np.linalg.norm(played - slow) < 0.01 * np.linalg.norm(slow)
 
 
@@ -51,7 +51,7 @@ def test_superposed_on_a_rendered_spring_a_free_mass_makes_the_planned_motion(sl
     mass_kg, spring = 0.3, VirtualSpring(120.0, 2.0)
     rigid = RigidModel(mass_kg * np.eye(3), np.zeros((3, 3)), np.zeros((3, 3)))
     motion = plan_motion(slow, RATE_HZ)
-    rendered = -(spring.stiffness_n_per_m * motion.position_m + spring.damping_n_s_per_m * motion.velocity_m_s)
+    rendered = -(spring.stiffness_n_per_m * motion.position_m + spring.damping_n_s_per_m * motion.velocity_mps)
     added = compute_low_band_forces(motion, rigid, RATE_HZ) - rendered
     position, velocity, made = np.zeros(3), np.zeros(3), np.empty_like(slow)
     for k, force in enumerate(added):

@@ -15,7 +15,11 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.effect_roles import IN_MODEL_REASON
-from equalizer.tracking.compensation.known_forces import LAWS, compute_deadband_share, compute_equivalent_impedance
+from equalizer.tracking.compensation.known_forces import (
+    LAWS,
+    compute_deadband_describing_function,
+    compute_equivalent_impedance,
+)
 from equalizer.tracking.compensation.law_compensation import SENSOR_ERROR
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from equalizer.tracking.feedforward.band_pass import filter_to_band
@@ -257,8 +261,8 @@ def test_other_frictions_have_their_shape():
 
 
 def test_a_dead_band_wider_than_the_amplitude_lets_nothing_through():
-    assert compute_deadband_share({"width": 0.5}, 0.4) == 0
-    assert compute_deadband_share({"width": 0.0}, 0.4) == 1
+    assert compute_deadband_describing_function({"width": 0.5}, 0.4) == 0
+    assert compute_deadband_describing_function({"width": 0.0}, 0.4) == 1
 
 
 @pytest.mark.parametrize("jump", [0.0, 0.4, 1.0])
@@ -266,7 +270,7 @@ def test_a_dead_bands_describing_function_is_its_fundamental(jump):
     angle = np.linspace(0, 2 * np.pi, 10_000, endpoint=False)
     wave = np.sin(angle)
     through = np.where(np.abs(wave) > 0.3, wave - (1 - jump) * 0.3 * np.sign(wave), 0.0)
-    assert compute_deadband_share({"width": 0.3, "jump": jump}, 1.0) == pytest.approx(
+    assert compute_deadband_describing_function({"width": 0.3, "jump": jump}, 1.0) == pytest.approx(
         2 * np.mean(through * wave), rel=1e-3
     )
 

@@ -73,6 +73,13 @@ def test_forces_above_the_cap_are_solved_under_it_with_the_loss_stated(model, no
     assert 0 < capped.loss.lost < capped.loss.error_clipped
 
 
+def test_an_unstable_model_is_refused(model, noise):
+    """Its predicted response overflowed, and forces were returned all the same."""
+    unstable = replace(model, A=1.05 / model.spectral_radius * model.A)
+    with pytest.raises(TrackingError, match=r"the model is not stable \(spectral radius 1.05\)"):
+        compute_feedforward_forces(unstable, noise)
+
+
 def test_a_table_with_nothing_in_the_band_is_refused(model):
     with pytest.raises(TrackingError, match="the reference has no content from 5 to 35 Hz"):
         compute_feedforward_forces(model, acceleration(np.zeros((500, 3))))

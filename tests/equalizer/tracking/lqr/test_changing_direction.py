@@ -15,6 +15,7 @@ from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.rotation import compute_rotation_basis
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 from tests.equalizer.tracking.lqr.dense_least_squares import least_squares_forces
+from tests.slow_instances import slow
 
 N = 120
 
@@ -24,7 +25,7 @@ def trajectory():
     return np.random.default_rng(7).standard_normal((N, 3))
 
 
-@pytest.mark.parametrize("weight", [1.0, 1e-2, 1e-4])
+@pytest.mark.parametrize("weight", [1e-2, *slow(1.0, 1e-4)])
 @pytest.mark.parametrize("feedthrough", [True, False], ids=["feedthrough", "delay"])
 def test_each_turn_is_a_new_solution_from_the_present_state(
     problem_of, random_rotation, difference, trajectory, weight, feedthrough

@@ -32,17 +32,18 @@ class Workspaces:
     def plant(self, along, bend=0.0):
         return self.plants.omega_like(0.2 * along, 10.0 * along, bend)
 
-    def identified(self, plant, seed, order=20, place_m=None) -> IdentifiedModel:
-        settings = IdentificationSettings(order=order, draws=0)
+    def identified(self, plant, seed, order=20, place_m=None, longer_horizons=(0, 2)) -> IdentifiedModel:
+        settings = IdentificationSettings(order=order, draws=0, longer_horizons=longer_horizons)
         model = identify(self.measuring.swept(self.plants, plant, seed), settings).model
         return IdentifiedModel(
             model.A, model.B, model.C, model.D, model.sample_rate_hz, model.band_hz, model.input_unit,
             model.output_unit, model.input_channels, model.output_channels, place_m=place_m,
         )  # fmt: skip
 
-    def models(self, along, seed, bend=0.0, order=20) -> WorkspaceModels:
+    def models(self, along, seed, bend=0.0, order=20, longer_horizons=(0, 2)) -> WorkspaceModels:
         found = [
-            self.identified(self.plant(x, bend), 100 * seed + round(50 * x), order, self.place_m(x)) for x in along
+            self.identified(self.plant(x, bend), 100 * seed + round(50 * x), order, self.place_m(x), longer_horizons)
+            for x in along
         ]
         return WorkspaceModels(tuple(found))
 
@@ -75,7 +76,7 @@ def workspaces(plants) -> Workspaces:
 
 @pytest.fixture(scope="session")
 def three(workspaces) -> WorkspaceModels:
-    return workspaces.models((0.0, 0.5, 1.0), seed=1)
+    return workspaces.models((0.0, 0.5, 1.0), seed=1, longer_horizons=(0,))
 
 
 @pytest.fixture(scope="session")

@@ -29,7 +29,10 @@ def measured(workspaces, plants):
 @pytest.fixture(scope="module")
 def rows(plants, three, measured, workspaces):
     hand = plants.omega_like(hand=True)
-    held = replace(make_identified_inverse(workspaces.identified(hand, 9, order=26), LINES), name="in the hand")
+    held = replace(
+        make_identified_inverse(workspaces.identified(hand, 9, order=26, longer_horizons=(0,)), LINES),
+        name="in the hand",
+    )
     responses = {
         "centre": plants.omega_like().response(LINES),
         "edge": workspaces.plant(1.0).response(LINES),
