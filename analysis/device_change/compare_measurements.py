@@ -34,7 +34,7 @@ class ChangeLimits:
     """Limit of friction: a step of 1 dB at the 1 N with which those staircases begin, 10^(1/20) - 1 = 0.12."""
     noise_factor: float = 2.0
     """Limit of the ratio of the noise, chosen by hand: a loose sensor or broken shield multiplies the noise."""
-    deviations: float = 3.0
+    standard_errors: float = 3.0
     """Number of standard errors beyond which a change is more than the scatter of the measurements, and multiple of the
     noise power that is subtracted from the difference of a response; chosen by hand."""
     band_octaves: float = 1 / 3
@@ -51,7 +51,7 @@ class Change:
     """One number of a device at its acceptance and today."""
 
     kind: str
-    """friction, gain, response or noise"""
+    """One of friction, gain, response and noise."""
     axis: str
     """Channel of the command, or of the response for noise; where lines of a band are not reliable any more, all
     channels of the command, joined by commas."""
@@ -124,7 +124,7 @@ def _compare_friction(accepted: DeviceMeasures, today: DeviceMeasures, limits: C
         error = float(np.hypot(accepted.friction_error_n[axis], today.friction_error_n[axis]))
         is_stuck = math.isnan(today_n) or math.isnan(accepted_n)
         changed = is_stuck or _is_significant(today_n - accepted_n, error, limits.friction_n, limits)
-        unclear = not changed and limits.deviations * error > limits.friction_n
+        unclear = not changed and limits.standard_errors * error > limits.friction_n
         yield Change("friction", channel, accepted_n, today_n, error, limits.friction_n, "N", changed, unclear=unclear)
 
 
@@ -152,7 +152,7 @@ def _compare_responses(accepted: FrequencyResponse, today: FrequencyResponse, li
         # Standard error of a median: sqrt(pi / 2) = 1.2533 times that of a mean; 1.4826 MAD estimates the deviation.
         error = float(1.2533 * 1.4826 * np.median(np.abs(ratio - gain)) / np.sqrt(len(ratio)))
         changed = _is_significant(np.log(gain), error / gain, np.log1p(limits.relative_step), limits)
-        unclear = not changed and limits.deviations * error > limits.relative_step
+        unclear = not changed and limits.standard_errors * error > limits.relative_step
         yield Change("gain", channel, 1.0, gain, error, limits.relative_step, "", changed, unclear=unclear)
         yield _find_worst_band(accepted, today, axis, gain, limits)
 
@@ -193,9 +193,9 @@ def _find_worst_band(
 ) -> Change:
     """Find the band in which the response, divided by the common gain, differs most beyond the noise.
 
-    Late and missed ticks make noise in bursts, which affect neighbouring lines alike. Therefore `deviations` times the
-    power that is expected from the scatter between periods is subtracted from the power of the difference, before it is
-    compared with the limit; from the reported value, that power is subtracted once."""
+    Late and missed ticks make noise in bursts, which affect neighbouring lines alike. Therefore `standard_errors` times
+    the power that is expected from the scatter between periods is subtracted from the power of the difference, before
+    it is compared with the limit; from the reported value, that power is subtracted once."""
     band_numbers = _number_bands(accepted.frequency_hz, limits)
     band_differences = []
     for band_number in np.unique(band_numbers):
@@ -211,7 +211,7 @@ def _find_worst_band(
             float(np.sum(noise)) / accepted_power,
         )
         band_lines_hz = accepted.frequency_hz[lines]
-        significant_share = float(np.sqrt(max(difference_power - limits.deviations * noise_power, 0.0)))
+        significant_share = float(np.sqrt(max(difference_power - limits.standard_errors * noise_power, 0.0)))
         difference_share = float(np.sqrt(max(difference_power - noise_power, 0.0)))
         band_differences.append(
             (
@@ -263,5 +263,5 @@ def _compare_noise(accepted: DeviceMeasures, today: DeviceMeasures, limits: Chan
 
 
 def _is_significant(difference: float, error: float, limit: float, limits: ChangeLimits) -> bool:
-    """Whether a difference exceeds both its limit and `deviations` standard errors."""
-    return bool(abs(difference) > limit and abs(difference) > limits.deviations * error)
+    """Whether a difference exceeds both its limit and `ChangeLimits.standard_errors`."""
+    return bool(abs(difference) > limit and abs(difference) > limits.standard_errors * error)

@@ -102,7 +102,7 @@ def _diagnose_by_balance(
         noise_known = all(floor.method == "repeats" for floor in fitting.chosen.floors)
         search_laws = partial(search_by_balance, context, balances, noise_known)
         result = settings.guard.run(BALANCE, "the fit of its laws", search_laws, None)
-        if result is not None and not (fitting.narrow and has_open_parameter(result)):
+        if result is not None and not (fitting.is_narrow_band and has_open_parameter(result)):
             return _assemble(recordings, settings, fitting, SearchOutcome(result, ModelErrorFloor()), balances)
     return None
 

@@ -92,10 +92,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "cross_axis_sensitivity": EffectWords(
         "cross-axis sensitivity of the sensor",
         {"from_next": "{} of the next axis", "from_after_next": "{} of the one after it"},
-        (
-            "from_next",
-            "from_after_next",
-        ),
+        ("from_next", "from_after_next"),
     ),
     "sensor_gain": EffectWords("a wrong sensor gain", {"gain": "a factor of {}"}),
     "sensor_nonlinearity": EffectWords("a nonlinear sensor", {"cubic": "cubic term {}"}),
@@ -180,8 +177,10 @@ LAW_WORDS: Mapping[str, LawWords] = {
         {"gap": ("m", "rad")},
         "actuator",
     ),
-    "added_stiffness": LawWords(EffectWords("an added spring", {"stiffness": "{}"}), {"stiffness": _STIFFNESS}),
-    "force_offset": LawWords(EffectWords("an offset of the force", {"offset": "{}"}), {"offset": _FORCE}, "actuator"),
+    "added_stiffness": LawWords(EffectWords("an added spring", {"stiffness": _VALUE_ALONE}), {"stiffness": _STIFFNESS}),
+    "force_offset": LawWords(
+        EffectWords("an offset of the force", {"offset": _VALUE_ALONE}), {"offset": _FORCE}, place="actuator"
+    ),
     "force_gain_drift": LawWords(
         EffectWords("a force gain that drifts", {"change": "by {} from beginning to end"}, shares=("change",)),
         place="actuator",
@@ -203,6 +202,13 @@ SIMULATED_AS_FORMULA = (
 
 WHOLE_DEVICE_FAULTS = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
 """Faults of the whole sensor or logger, for which no place is named where all channels share them."""
+
+_PLACE_PHRASES: Mapping[str, tuple[str, str]] = {
+    "mechanism": ("on the {} drive", "on all drives"),
+    "actuator": ("in the {} actuator", "in all actuators"),
+    "sensor": ("in the {} channel", "in all channels"),
+}
+"""Phrases for one axis or channel and for all, by place."""
 
 
 def get_noun(effect: str) -> str:
@@ -250,14 +256,6 @@ def format_place(place: Place, axis: str | None, is_single_axis: bool = False) -
     if axis is None:
         return one_place.format("").replace("  ", " ") if is_single_axis else all_places
     return one_place.format(axis)
-
-
-_PLACE_PHRASES: Mapping[str, tuple[str, str]] = {
-    "mechanism": ("on the {} drive", "on all drives"),
-    "actuator": ("in the {} actuator", "in all actuators"),
-    "sensor": ("in the {} channel", "in all channels"),
-}
-"""Phrases for one axis or channel and for all, by place."""
 
 
 def format_parameters(effect: str, parameters: Mapping[str, Estimate]) -> str:

@@ -200,6 +200,7 @@ IMPACTS_RIVAL_RATIO = 1.1  # ratio to the misfit of the named effect, up to whic
 MOST_RIVALS = 6  # most rivals that are reported per effect; by hand
 # widens intervals by noise alone, which held 65 % (bank 91000); least half width, relative to the value
 INTERVAL_FACTOR, INTERVAL_SHARE = 2.5, 0.005
+INTERVAL_HALF_WIDTH = 1.96 * INTERVAL_FACTOR  # half width of such a 95 % interval, in standard errors
 # limit of the jackknife error over segments, in standard errors by noise. Bank 99700 (docs/proof_history.md)
 MOST_BETWEEN_SEGMENTS = 5.0
 # difference of gain that makes a candidate e times less likely. Bank (docs/proof_history.md), as the next three
@@ -261,13 +262,14 @@ SLEW_REACHED_SHARE = 0.25
 # largest share of the noise in the mean square of the acceleration: about the relative bias of an estimated mass
 ACCELERATION_NOISE_SHARE = 0.01
 HIGHEST_BAND_END_RATIO = 0.2  # largest upper end of the band, relative to the sample rate
-BAND_NARROWEST_CYCLES = 20.0  # least upper end of the band, in cycles per recording
+LEAST_BAND_END_CYCLES = 20.0  # least upper end of the band, in cycles per recording
 SECOND_BAND_SHARE = 0.5  # share of the noise-limited band, below which the motion's band is balanced as well
 # share of the samples in which the device moves, below which a second balance uses only these samples
 MOVING_TIME_SHARE = 0.5
 MOVING_BAND_SHARE = 0.99  # share of the speed's mean square below the upper end of the band in which the device moves
 MOTION_OVERSAMPLED = 4.0  # samples kept per period of the band's upper end
-# periods of the band's upper end that are left out at both ends of a part, where the filter reaches beyond the data
+# periods of the band's lower end, or of its upper end where there is no lower one, that are left out at both ends of a
+# part, where the filter reaches beyond the data
 MOTION_EDGE_PERIODS = 0.5
 BALANCE_FOLDS = 8  # least number of blocks to fit, and of blocks to test by
 # largest number of samples to fit to, and of samples to test by: the first ones of each block
@@ -278,19 +280,19 @@ MOST_SUMMED_LAWS = 3  # laws in one sum
 STRUCTURES_BEAM = 5  # structures of each size that are extended further
 FURTHER_LAW_GAIN = 0.02  # share of the cross-validated error power that a further law must remove
 FURTHER_LAW_ERRORS = 2.0  # standard errors that the folds' mean gain, or their mean logarithmic gain, must exceed
-# share of the best structure's error reduction, relative to the linear model, that a plainer structure may miss
-PLAINER_SHORTFALL = 0.1
-# share that further laws must remove of the error that a plain structure leaves above that of all laws together
+# share of the best structure's error reduction, relative to the linear model, that a simpler structure may miss
+SIMPLER_SHORTFALL = 0.1
+# share that further laws must remove of the error that a structure leaves above that of all laws together
 FURTHER_LAW_EXCESS = 0.5
-FURTHER_LAW_SHARE = 0.3  # share that further laws must remove of the whole error that a plain structure leaves
+FURTHER_LAW_SHARE = 0.3  # share that further laws must remove of the whole error that a structure leaves
 LINEAR_LAW_GAIN = 0.1  # share of the cross-validated error power that a delay or a linear law must remove
 MOST_LINEAR_LAWS = 4  # linear laws in addition to mass, damping and stiffness
 LINEAR_PART_ROUNDS = 2  # most searches, each with the linear part that the previous one found
 
 # Which laws of a balance are named (`judge_laws`, `judged_law`). By hand.
 # share of the error reduction by all laws together that the named laws must reach: then they are its main part
-NAMED_CEILING_SHARE = 0.5
-LAW_CEILING_SHARE = 0.05  # share of that reduction which each named law must reach
+NAMED_REDUCTION_SHARE = 0.5
+LAW_REDUCTION_SHARE = 0.05  # share of that reduction which each named law must reach
 RIVAL_MARGIN = 0.15  # share of a law's gain by which a rival in its place must be worse to be ruled out
 # share of the force's rms that a law must take: laboratory recordings are not calibrated better
 LAW_FORCE_SHARE = 0.02

@@ -1,9 +1,10 @@
 """Prepare recordings for the comparison with a model, whether they come from files or from arrays.
 
-In this order: segments are found where a recording states none; commands and responses are brought into the form that a
-force balance needs (only where no model was given); recordings with an imposed motion become force-driven; short gaps
-in commands are interpolated and long ones cut out; unsuitable recordings are refused; positions and conditions that not
-all recordings contain are removed, then constant positions.
+In this order: isolated samples that no motion can have are interpolated; segments are found where a recording states
+none; commands and responses are brought into the form that a force balance needs (only where no model was given);
+recordings with an imposed motion become force-driven; short gaps in commands are interpolated and long ones cut out;
+unsuitable recordings are refused; positions and conditions that not all recordings contain are removed, then constant
+positions.
 """
 
 from collections.abc import Sequence
@@ -41,9 +42,13 @@ def prepare_recordings(
     the order of names. without_model: whether to convert them to one motion per force (no model was given).
     accept_short: whether few cycles or samples are a remark instead of a refusal; None = the value of without_model.
     Raises NothingToDiagnoseError for unsuitable recordings."""
-    segment_results = [find_segments(recording) for recording in recordings]
-    repeat_texts = [(name, text) for name, (_, text) in zip(names, segment_results, strict=True) if text]
-    repeat_remarks = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in repeat_texts)
+    # Imported on demand: trials of a session are not changed.
+    from equalizer.signals.isolated_samples import interpolate_isolated_samples
+
+    interpolated, interpolation_texts = zip(*map(interpolate_isolated_samples, recordings), strict=True)
+    interpolation_remarks = _prefix_names(names, interpolation_texts)
+    segment_results = [find_segments(recording) for recording in interpolated]
+    repeat_remarks = _prefix_names(names, [text for _, text in segment_results])
     segmented_recordings = tuple(recording for recording, _ in segment_results)
     force_recordings: tuple[Recording, ...] = segmented_recordings
     omission_remarks: tuple[str, ...] = ()
@@ -55,7 +60,15 @@ def prepare_recordings(
     force_driven, gap_remarks = bridge_gaps(convert_all_to_force_driven(force_recordings), names)
     prepared = prepare_comparison(force_driven, names, without_model if accept_short is None else accept_short)
     return PreparedRecordings(
-        prepared.recordings, (*repeat_remarks, *omission_remarks, *gap_remarks, *prepared.remarks)
+        prepared.recordings,
+        (*interpolation_remarks, *repeat_remarks, *omission_remarks, *gap_remarks, *prepared.remarks),
+    )
+
+
+def _prefix_names(names: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]:
+    """Prefix sentences, one per recording, with its name where there are several; without the empty ones."""
+    return tuple(
+        text if len(names) == 1 else f"{name}: {text}" for name, text in zip(names, texts, strict=True) if text
     )
 
 

@@ -109,7 +109,9 @@ def format_error_of_signal(error: float) -> str:
 
 def format_probability(probability: float) -> str:
     """Format a probability with two decimals, or "< 0.01" or "> 0.99" outside that range."""
-    return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
+    if probability < 0.01:
+        return "< 0.01"
+    return "> 0.99" if probability > 0.99 else f"{probability:.2f}"
 
 
 def format_share(share: float) -> str:

@@ -26,9 +26,9 @@ EQUIVALENCE_UP_TO_HZ = 25.0
 """Highest frequency (Hz) tested for equivalence: up to it the published thresholds are similar, and none is
 censored."""
 
-ROUNDING_DB = 1e-9
-"""Range of differences or sums (dB) up to which they count as equal, because sums of the same steps differ by
-rounding. Chosen."""
+ROUNDING_DB = 1e-5
+"""Range of differences or sums (dB) up to which they count as equal: sums of the same steps differ by rounding, and
+pseudo-thresholds of the same answers by the tolerance of the fit (up to 3e-8 dB of simulated people). Chosen."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ person at a device that did not move).
 from collections.abc import Iterable
 from enum import Enum
 
+from analysis.psychophysics.runs import InconsistentTrialsError
 from protocols.trial import Trial
 
 
@@ -26,7 +27,7 @@ def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial
     """Split the trials by population, in the order of `Population`; trials are ordered by session, and sessions by
     their first trial. A population without trials has no key.
 
-    Raises ValueError, with the name of the session, where its answers belong to different populations.
+    Raises InconsistentTrialsError, with the name of the session, where its answers belong to different populations.
     """
     sessions: dict[tuple[str, str], list[Trial]] = {}
     for trial in trials:
@@ -44,14 +45,15 @@ def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial
 
 
 def _find_session_population(subject: str, session: str, session_trials: list[Trial]) -> Population:
-    """Find the population of one session from its trials (at least one); raises ValueError where they disagree."""
+    """Find the population of one session from its trials (at least one); raises InconsistentTrialsError where they
+    disagree."""
     # Only answered trials count, if there are any: `felt` may not be known yet for a trial without an answer.
     populations = {_find_trial_population(trial) for trial in session_trials if trial.is_valid} or {
         _find_trial_population(trial) for trial in session_trials
     }
     if len(populations) > 1:
         kinds = " and ".join(population.value for population in Population if population in populations)
-        raise ValueError(
+        raise InconsistentTrialsError(
             f"session {session} of {subject} mixes trials of {kinds} (column felt): a session contains trials of "
             "one kind only; find the cause, remove the wrong rows, and analyse it again"
         )

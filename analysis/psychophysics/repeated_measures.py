@@ -105,10 +105,13 @@ class RepeatedMeasures:
     """p-value of Mauchly's test; small where sphericity is violated."""
 
 
-def analyse_repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
+def analyse_repeated_measures(
+    subjects: Sequence[str], values: Sequence[Sequence[float | None]], rounding: float = 0.0
+) -> RepeatedMeasures:
     """Compute the repeated-measures analysis of variance of values[subject][condition], any unit, rows of equal length;
-    None, NaN and infinity count as missing. subjects: names, one per row (ValueError otherwise). Without 2 complete
-    rows, 2 conditions or an error above rounding, all results are None."""
+    None, NaN and infinity count as missing. subjects: names, one per row (ValueError otherwise). rounding: rms error,
+    in that unit, up to which it counts as rounding, beside that of 64-bit floats. Without 2 complete rows, 2 conditions
+    or an error above rounding, all results are None."""
     completeness = [all(value is not None and math.isfinite(value) for value in row) for row in values]
     left_out = tuple(subject for subject, is_complete in zip(subjects, completeness, strict=True) if not is_complete)
     conditions = len(values[0]) if values else 0
@@ -123,7 +126,7 @@ def analyse_repeated_measures(subjects: Sequence[str], values: Sequence[Sequence
         notes.append(f"The analysis within participants needs two conditions; there are {conditions}.")
         return _make_empty_analysis(len(rows), left_out, conditions, notes)
     ss_conditions, ss_participants, ss_error = _compute_sums_of_squares(rows)
-    if is_rounding_error(ss_error, rows):
+    if is_rounding_error(ss_error, rows) or ss_error <= rows.size * rounding**2:
         notes.append("All participants change alike over the conditions, so there is no error to compare with.")
         return _make_empty_analysis(len(rows), left_out, conditions, notes)
     return _compute_analysis(rows, left_out, (ss_conditions, ss_participants, ss_error), notes)

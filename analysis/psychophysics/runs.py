@@ -27,7 +27,7 @@ ROUNDING_DB = 1e-3
 
 
 class InconsistentTrialsError(ValueError):
-    """Rows of trials that cannot result from the protocol's rule."""
+    """Rows of trials that cannot result from the protocol's rule, or that cannot enter one analysis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,9 +139,8 @@ def _refuse_level_beyond_roving(trial: Trial, rove_db: float) -> None:
     if rove_db == 0 or deviation_db > rove_db / 2 + ROUNDING_DB:
         roving_text = f"roves by {rove_db / 2:g} dB to either side" if rove_db else "roves no levels"
         raise InconsistentTrialsError(
-            f"{_describe_trial(trial)}: level_n is {trial.level_n:.6g} N around a nominal_n of "
-            f"{trial.nominal_n:.6g} N, "
-            f"but the protocol {roving_text}; the rows belong to another protocol or were changed"
+            f"{_describe_trial(trial)}: level_n is {trial.level_n:.6g} N around a nominal_n of {trial.nominal_n:.6g} "
+            f"N, but the protocol {roving_text}; the rows belong to another protocol or were changed"
         )
 
 

@@ -32,7 +32,7 @@ from analysis.psychophysics.repeated_measures import (
     compute_friedman_test,
 )
 from analysis.psychophysics.repeated_trials import format_repeat_warning
-from analysis.psychophysics.runs import Run, recompute_runs
+from analysis.psychophysics.runs import InconsistentTrialsError, Run, recompute_runs
 from analysis.psychophysics.study_warnings import list_catch_and_detection_warnings, list_study_warnings
 from analysis.psychophysics.threshold_table import ThresholdTable, tabulate_thresholds
 from analysis.psychophysics.thresholds import Threshold, compute_run_threshold
@@ -157,8 +157,8 @@ def analyse_study(trials: Iterable[Trial], protocol: StudyProtocol, left_out: Se
     """Compute thresholds, statistics and warnings from trials of one population under one protocol.
 
     left_out: sessions and trials that are not among these, with the reason, in sentences; listed in `declared_result`.
-    Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
-    with `split_by_population` first), and InconsistentTrialsError where they contradict the protocol's staircase.
+    Raises InconsistentTrialsError (a ValueError) when the trials mix people, simulated participants and people who felt
+    nothing (split them with `split_by_population` first), and where they contradict the protocol's staircase.
     """
     trials, rule = tuple(trials), protocol.staircase
     population, runs = _find_single_population(trials), recompute_runs(trials, rule, rove_db=protocol.stimulus.rove_db)
@@ -197,10 +197,10 @@ def analyse_study(trials: Iterable[Trial], protocol: StudyProtocol, left_out: Se
 
 
 def _find_single_population(trials: Sequence[Trial]) -> Population | None:
-    """Find the population of all trials; None without trials. Raises ValueError where populations are mixed."""
+    """Find the population of all trials; None without any. Raises InconsistentTrialsError for several."""
     by_population = split_by_population(trials)
     if len(by_population) > 1:
-        raise ValueError(
+        raise InconsistentTrialsError(
             f"trials of {' and '.join(kind.value for kind in by_population)} cannot enter one analysis; analyse each "
             "kind separately"
         )

@@ -48,7 +48,8 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 MOST_PASSES = 8
 """Largest number of passes of the coordinate search over a law's parameters; chosen by hand."""
-UNNECESSARY_REASON = "a law of the command reaches as small an error without it"  # objection to a law of the motion
+UNNECESSARY_REASON = "a law of the command reaches as small an error without it"
+"""Objection to a law of the motion."""
 CURVE_LIKE_LAW = "quadratic_damping"
 """Law of the motion that resembles an actuator's curve when the speed follows the command."""
 HOLDING_LAWS = (*SLIDING, "presliding_hysteresis")
@@ -72,9 +73,9 @@ class ActuatorFit:
 
 @dataclass(frozen=True, slots=True)
 class DrivenAxis:
-    """An axis whose command is examined: its number, its kind, and what the command sets."""
+    """An axis whose command is examined: its index, its kind, and what the command sets."""
 
-    number: int
+    index: int
     rotational: bool
     target: int | None = None
     """Order of the position's time derivative that the command sets (target of a servo); None = it is a force."""
@@ -85,7 +86,7 @@ def find_balance(
 ) -> Balance:
     """Find the balance of one axis: laws of the motion and, where significant, a law of the command. With a named one,
     the laws of the motion are searched again for the force that it gives."""
-    axis, rotational = driven.number, driven.rotational
+    axis, rotational = driven.index, driven.rotational
     balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
     actuator = find_command_law(balance, driven, excluded, map_) if balance.tested else None
     if actuator is None:
@@ -95,19 +96,17 @@ def find_balance(
         driven_channel = balance.search.regression.base_terms.driven_channel
         passed_motions = [_pass_through_law(motion, axis, driven_channel, actuator.law) for motion in motions]
         second_balance = judge_laws(search_with_linear_part(passed_motions, axis, rotational, excluded, time_left))
-        return replace(second_balance, laws=(judged_law, *second_balance.laws), linear=balance.linear)
+        return replace(second_balance, laws=(judged_law, *second_balance.laws), linear_error=balance.linear_error)
     if judged_law.gain_low <= 0 or judged_law.gain < FURTHER_LAW_SHARE:
         return balance
     if judged_law.gain < COMMAND_LAW_GAIN and not actuator.replaces_motion_laws:
         judged_motion_laws = tuple(_withdraw_if_curved(law, actuator) for law in balance.laws)
         further_laws = tuple(sorted((*balance.further_laws, judged_law), key=lambda item: -item.gain))
         return replace(balance, laws=judged_motion_laws, further_laws=further_laws)
-    listed_laws = (
-        [replace(item, objection=item.objection or UNNECESSARY_REASON) for item in balance.laws]
-        if actuator.needs_no_motion_law
-        else balance.laws
-    )
-    return replace(balance, laws=(judged_law, *listed_laws))
+    motion_laws = balance.laws
+    if actuator.needs_no_motion_law:
+        motion_laws = tuple(replace(law, objection=law.objection or UNNECESSARY_REASON) for law in motion_laws)
+    return replace(balance, laws=(judged_law, *motion_laws))
 
 
 def _withdraw_if_curved(law: JudgedLaw, actuator: ActuatorFit) -> JudgedLaw:
@@ -176,7 +175,7 @@ def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozense
     if motions[0].order == 0 and not rotational:
         position = np.concatenate([motion.position[motion.fit, driven_channel] for motion in motions])
         kinds.append((make_piecewise_attraction(position), list(make_electromagnet_laws(position))))
-    allowed = [(approx, [law for law in laws if law.effect not in excluded]) for approx, laws in kinds]
+    allowed = [(approximation, [law for law in laws if law.effect not in excluded]) for approximation, laws in kinds]
     return [kind for kind in allowed if kind[1]]
 
 
@@ -187,8 +186,8 @@ def _select_promising(
     fitted to, and of kinds without such a sum: other laws need not be tried one by one."""
     return [
         law
-        for approx, laws in kinds
-        if approx is None or inverse.fit_lower_bound(approx, motion_laws) <= limit
+        for approximation, laws in kinds
+        if approximation is None or inverse.fit_lower_bound(approximation, motion_laws) <= limit
         for law in laws
     ]
 
@@ -277,6 +276,7 @@ def _judge_law(
     equivalents = tuple(effect for errors, effect in rival_errors if float(errors.sum()) <= largest_error)
     is_best = [errors[draws].sum(axis=1) >= full[draws].sum(axis=1) for errors, _ in rival_errors]
     gain, gain_low = bootstrap_gain(reduced, full)
+    # A law of the command has no column in the regression: the functions of this `Law` are not used.
     placeholder_law = Law(law.effect, inverse.search.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
     return JudgedLaw(
         NO_COLUMN, placeholder_law, dict(law.values), gain, gain_low,

@@ -1,4 +1,4 @@
-"""Withdraws the name of a law of motion where a law of the actuator explains the data equally well.
+"""Withdraw the name of a law of motion where a law of the actuator explains the data equally well.
 
 With the velocity v, acceleration a and command u of an axis, the force balance is m a + d v + F_c sgn v + c v |v| =
 g(u). It does not identify its laws uniquely in three cases:
@@ -65,7 +65,7 @@ def _withdraw_ambiguous_name(judged_law: JudgedLaw, balance: Balance) -> JudgedL
             for named_law in balance.named
         )
         if has_named_friction and not _has_reversal(regression, judged_law.law.channel):
-            return _add_equivalent(judged_law, "force_nonlinearity", NO_REVERSAL_REASON)
+            return _add_equivalent(judged_law, EQUIVALENT_LAWS[effect], NO_REVERSAL_REASON)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
         return _add_equivalent(judged_law, EQUIVALENT_LAWS[effect], "the inertia is negligible in this recording")
     return judged_law

@@ -20,9 +20,9 @@ from analysis.diagnosis.balance.motion import (
     compute_motions,
     find_motion_signals,
 )
-from analysis.diagnosis.data.measured_motion import stays_at_limit
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
+from analysis.diagnosis.data.readings_at_limit import stays_at_limit
 from analysis.diagnosis.limits import MOVING_TIME_SHARE, SECOND_BAND_SHARE, STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from analysis.wording import conjoin

@@ -11,60 +11,65 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.diagnosis.limits import ACCELERATION_NOISE_SHARE, BAND_NARROWEST_CYCLES, HIGHEST_BAND_END_RATIO
+from analysis.diagnosis.limits import ACCELERATION_NOISE_SHARE, HIGHEST_BAND_END_RATIO, LEAST_BAND_END_CYCLES
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import estimate_spectral_density
 
+LEAST_BAND_BEGIN_CYCLES = 4.0
+"""Least lower end of the band, in cycles of the shortest recording: an integral over a finite recording is wrong at
+lower frequencies. Chosen."""
+MOST_SEGMENT_SAMPLES = 4096
+"""Largest number of samples in a segment from which the spectral density is estimated. Chosen."""
+
 
 def compute_band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
-    """Compute the upper end of the band in Hz: median over recordings and channels, at least `BAND_NARROWEST_CYCLES`
-    cycles in the longest recording, at most `HIGHEST_BAND_END_RATIO` of the sample rate. samples: (n, d) each. order:
-    time derivative of the position that was measured (0, 1 or 2)."""
-    upper_ends_hz = [
-        _compute_channel_band_end_hz(column, rate_hz, 2 * (2 - order))
-        for recording_samples in samples
-        for column in recording_samples.T
+    """Compute the upper end of the band in Hz: median over the recordings' channels that have usable lines, at least
+    `LEAST_BAND_END_CYCLES` cycles in the longest recording, at most `HIGHEST_BAND_END_RATIO` of the sample rate.
+    samples: (n, d) each. order: time derivative of the position that was measured (0, 1 or 2)."""
+    usable_lines_hz = [
+        _find_usable_lines_hz(column - np.linspace(column[0], column[-1], len(column)), rate_hz, 2 * (2 - order))
+        for column in _list_varying_columns(samples)
     ]
+    upper_ends_hz = [lines_hz[-1] for lines_hz in usable_lines_hz if len(lines_hz)] or [rate_hz / MOST_SEGMENT_SAMPLES]
     longest_samples = max(len(recording_samples) for recording_samples in samples)
     return float(
         np.clip(
             np.median(upper_ends_hz),
-            BAND_NARROWEST_CYCLES * rate_hz / longest_samples,
+            LEAST_BAND_END_CYCLES * rate_hz / longest_samples,
             HIGHEST_BAND_END_RATIO * rate_hz,
         )
     )
 
 
 def compute_band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
-    """Compute the lower end in Hz of the band in which accelerations are integrated twice: median over recordings and
-    channels, at least two cycles in the shortest recording. A channel without a usable line counts with the lowest
-    line above 0. samples: accelerations (n, d) each."""
-    lower_ends_hz = []
-    for column in (column for recording_samples in samples for column in recording_samples.T):
-        frequency_hz, density, noise_density = _estimate_signal_and_noise_density(column, rate_hz)
-        integration_gain = frequency_hz**-4.0
-        signal_power = np.cumsum((np.maximum(density - noise_density, 0.0) * integration_gain)[::-1])[::-1]
-        noise_power = np.cumsum((noise_density * integration_gain)[::-1])[::-1]
-        usable_lines = np.flatnonzero(noise_power <= ACCELERATION_NOISE_SHARE * signal_power)
-        lower_ends_hz.append(float(frequency_hz[usable_lines[0]]) if len(usable_lines) else float(frequency_hz[0]))
+    """Compute the lower end in Hz of the band in which accelerations are integrated twice: median over the recordings'
+    channels that have usable lines, at least `LEAST_BAND_BEGIN_CYCLES`. samples: accelerations (n, d) each."""
+    usable_lines_hz = [_find_usable_lines_hz(column, rate_hz, -4) for column in _list_varying_columns(samples)]
+    lower_ends_hz = [lines_hz[0] for lines_hz in usable_lines_hz if len(lines_hz)] or [rate_hz / MOST_SEGMENT_SAMPLES]
     shortest_samples = min(len(recording_samples) for recording_samples in samples)
-    return max(float(np.median(lower_ends_hz)), 2 * rate_hz / shortest_samples)
+    return max(float(np.median(lower_ends_hz)), LEAST_BAND_BEGIN_CYCLES * rate_hz / shortest_samples)
 
 
-def _compute_channel_band_end_hz(column: FloatArray, rate_hz: float, exponent: int) -> float:
-    """Compute the highest frequency in Hz up to which the noise of a channel (n,) is at most `ACCELERATION_NOISE_SHARE`
-    of its signal power, both weighted by f^exponent; the lowest line above 0 where there is none."""
-    detrended = column - np.linspace(column[0], column[-1], len(column))
-    frequency_hz, density, noise_density = _estimate_signal_and_noise_density(detrended, rate_hz)
-    signal_power = np.cumsum(np.maximum(density - noise_density, 0.0) * frequency_hz**exponent)
-    noise_power = np.cumsum(noise_density * frequency_hz**exponent)
-    usable_lines = np.flatnonzero(noise_power <= ACCELERATION_NOISE_SHARE * signal_power)
-    return float(frequency_hz[usable_lines[-1]] if len(usable_lines) else frequency_hz[0])
+def _list_varying_columns(samples: Sequence[FloatArray]) -> list[FloatArray]:
+    """List the channels (n,) of each recording that vary: a constant reading, as of an axis at rest, has no noise to
+    measure."""
+    return [column for recording_samples in samples for column in recording_samples.T if np.ptp(column) > 0]
+
+
+def _find_usable_lines_hz(column: FloatArray, rate_hz: float, exponent: int) -> FloatArray:
+    """Find the frequencies (lines,) in Hz up to which (exponent < 0: from which on) the noise of a channel (n,) is at
+    most `ACCELERATION_NOISE_SHARE` of its signal power, both weighted by f^exponent; none for mere noise."""
+    frequency_hz, density, noise_density = _estimate_signal_and_noise_density(column, rate_hz)
+    weights = frequency_hz ** float(exponent)
+    order = slice(None, None, -1 if exponent < 0 else 1)
+    signal_power = np.cumsum((np.maximum(density - noise_density, 0.0) * weights)[order])[order]
+    noise_power = np.cumsum((noise_density * weights)[order])[order]
+    return np.asarray(frequency_hz[noise_power <= ACCELERATION_NOISE_SHARE * signal_power])
 
 
 def _estimate_signal_and_noise_density(column: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, float]:
-    """Estimate the spectral density of a channel (n,) from segments of at most 4096 samples (chosen). Returns the
-    frequencies (lines,) above 0 in Hz, the density (lines,) there in squared units per Hz, and that of its white noise:
-    the median over the upper quarter of the lines."""
-    frequency_hz, density = estimate_spectral_density(column, rate_hz, 4096)
+    """Estimate the spectral density of a channel (n,). Returns the frequencies (lines,) above 0 in Hz, the density
+    (lines,) there in squared units per Hz, and that of its white noise: the median over the upper quarter of the
+    lines."""
+    frequency_hz, density = estimate_spectral_density(column, rate_hz, MOST_SEGMENT_SAMPLES)
     return frequency_hz[1:], density[1:], float(np.median(density[1 + 3 * (len(density) - 1) // 4 :]))

@@ -38,7 +38,7 @@ class Block:
     """y'y."""
     centred_power: float
     """Sum of squares of the force about its mean over all fitted samples."""
-    motion: int
+    motion_index: int
     """Index of the motion to which the block belongs."""
     rows: npt.NDArray[np.intp]
     """Indices of the block's samples among the kept samples of its motion."""

@@ -49,7 +49,9 @@ def _replace_law_products(
         columns, [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
     )
     fit, test = (
-        tuple(_update_products(regression, block, (column_range, scale), columns[block.motion]) for block in blocks)
+        tuple(
+            _update_products(regression, block, (column_range, scale), columns[block.motion_index]) for block in blocks
+        )
         for blocks in (regression.fit, regression.test)
     )
     laws = (*regression.laws[:law_index], law, *regression.laws[law_index + 1 :])
@@ -111,10 +113,10 @@ def _update_products(
     """Recompute the products of a block's columns in a range, which are replaced by `columns` (kept samples, k) of its
     motion. range_and_scale: the range, and the scale (all columns,) with that of the new ones."""
     column_range, scale = range_and_scale
-    scaled_columns = regression.columns[block.motion][block.rows] / scale
+    scaled_columns = regression.columns[block.motion_index][block.rows] / scale
     scaled_columns[:, column_range] = columns[block.rows] / scale[column_range]
     gram, cross = block.gram.copy(), block.cross.copy()
     gram[:, column_range] = scaled_columns.T @ scaled_columns[:, column_range]
     gram[column_range, :] = gram[:, column_range].T
-    cross[column_range] = scaled_columns[:, column_range].T @ regression.force[block.motion][block.rows]
+    cross[column_range] = scaled_columns[:, column_range].T @ regression.force[block.motion_index][block.rows]
     return replace(block, gram=gram, cross=cross)

@@ -6,8 +6,8 @@ significantly better than the chosen sum, and leaves at most 1 - `FREE_LAW_GAIN`
 (of the linear balance's where no law of the sum can be named), the sum with the fewest parameters at about the same
 error is completed by further laws (`add_further_laws`) and judged on held-out data, with the catalogue's laws as
 rivals. It replaces the chosen sum where a free law with a gain of at least `FREE_LAW_GAIN` is named, or where there is
-such a law, the chosen sum has no named law, and the rms error is at most half of the linear balance's. A chosen sum of
-laws of several families loses its names where a single free law is significantly better.
+such a law, the chosen sum has no named law, and the rms error is at most half of the linear balance's. Else the chosen
+sum may lose its names (`withdraw_names_of_surpassed_sum`).
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,13 @@ import numpy as np
 from analysis.diagnosis.balance.change_laws import append_laws
 from analysis.diagnosis.balance.judge_laws import Balance, judge_structure
 from analysis.diagnosis.balance.judged_law import find_family
-from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS, make_free_laws
-from analysis.diagnosis.balance.laws.law import measure_scales
+from analysis.diagnosis.balance.laws.free_laws import (
+    FREE_LAWS,
+    FREE_POSITION_LAWS,
+    FREE_SPEED_LAWS,
+    make_free_laws,
+)
+from analysis.diagnosis.balance.laws.law import Law, measure_scales
 from analysis.diagnosis.balance.linear_part import is_freely_turning
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import (
@@ -30,12 +35,17 @@ from analysis.diagnosis.balance.structures import (
     improves_significantly,
     refine_parameters,
 )
-from analysis.diagnosis.limits import FREE_LAW_GAIN, MOST_SUMMED_LAWS, PLAINER_SHORTFALL
+from analysis.diagnosis.limits import FREE_LAW_GAIN, MOST_SUMMED_LAWS, SIMPLER_SHORTFALL
 
 MOST_COMPARED_SUMS = 12
 """Number of sums whose nonlinear parameters are refined. Chosen: there are eleven free laws."""
-SURPASSED_REASON = "a single law that the catalogue lacks explains more than the sum of laws of which this is one"
+SURPASSED_REASON = "a single law that the catalogue lacks explains more than this one, or the sum of laws with it"
 """Reason, in a message, not to name the laws of a sum."""
+LAWS_BY_ARGUMENT = (
+    find_family("coulomb_friction") | FREE_SPEED_LAWS,
+    find_family("hardening_stiffness") | FREE_POSITION_LAWS,
+)
+"""Laws of the speed alone or nearly so, and of the position: in the catalogue and outside."""
 CONTACTS = {"end_stop", "contact_beyond_position"}
 """Laws of a contact that closes at a position, in the catalogue and outside."""
 
@@ -49,7 +59,7 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
     if excluded >= FREE_LAWS or not balance.tested or has_law_of_command or regression.prior is not None:
         return balance
     channel = regression.base_terms.driven_channel
-    scales = replace(measure_scales(regression.motions, channel, False), turns=is_freely_turning(regression))
+    scales = replace(measure_scales(regression.motions, channel, False), turns_freely=is_freely_turning(regression))
     tried_laws = [law for law in make_free_laws(channel, scales) if law.effect not in excluded]
     if not tried_laws:
         return balance
@@ -60,11 +70,11 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
     # A catalogue sum of which nothing can be named is no explanation: the linear balance is then the reference.
     reference_error = (balance.chosen if balance.named else balance.search.linear).error
     best_sum = min(sums, key=lambda s: s.error, default=balance.chosen)
-    kept_balance = withdraw_names_of_surpassed_sum(balance, sums)
+    kept_balance = withdraw_names_of_surpassed_sum(balance, extended_regression, sums)
     if best_sum.error > (1 - FREE_LAW_GAIN) * reference_error or not improves_significantly(balance.chosen, best_sum):
         return kept_balance
     good_sums = [
-        s for s in sums if s.error <= best_sum.error + PLAINER_SHORTFALL * (balance.chosen.error - best_sum.error)
+        s for s in sums if s.error <= best_sum.error + SIMPLER_SHORTFALL * (balance.chosen.error - best_sum.error)
     ]
     simplest = min(good_sums, key=lambda s: (count_parameters(extended_regression, s.laws), s.error))
     search = replace(
@@ -76,17 +86,28 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
     judged_balance = judge_structure(search, simplest)
     free_laws = [law for law in judged_balance.laws if law.is_free and law.gain_low > 0 and law.gain >= FREE_LAW_GAIN]
     # A law that is not named is a candidate only where its sum halves the linear balance's error on the test blocks.
-    halves_error = judged_balance.error <= np.sqrt(1 - FREE_LAW_GAIN) * balance.linear and not balance.named
+    halves_error = judged_balance.error <= np.sqrt(1 - FREE_LAW_GAIN) * balance.linear_error and not balance.named
     return judged_balance if free_laws and (halves_error or any(law.named for law in free_laws)) else kept_balance
 
 
-def withdraw_names_of_surpassed_sum(balance: Balance, sums: Sequence[Structure]) -> Balance:
+def withdraw_names_of_surpassed_sum(balance: Balance, regression: Regression, sums: Sequence[Structure]) -> Balance:
     """Withdraw the names of laws of several families where a single free law leaves significantly less error than their
-    sum, which then only approximates it. sums: with one free law each, alone or with others."""
-    effects = [law.law.effect for law in balance.laws if not law.law.is_linear]
-    has_families = len({frozenset(find_family(effect)) for effect in effects}) > 1
-    is_surpassed = any(len(s.laws) == 1 and improves_significantly(balance.chosen, s) for s in sums)
-    return balance.withdraw_names(SURPASSED_REASON) if has_families and is_surpassed else balance
+    sum, which then only approximates it; and the names of laws of one family where a free law of other arguments (such
+    as a product, in place of a damping) does so. sums: laws (indices in the regression), with one free law each."""
+    effects = {law.law.effect for law in balance.laws if not law.law.is_linear}
+    if len({frozenset(find_family(effect)) for effect in effects}) > 1:
+        rivals = [s for s in sums if len(s.laws) == 1]
+    else:
+        like_laws = next((laws for laws in LAWS_BY_ARGUMENT if effects <= laws), effects)
+        laws_of_sums = [(s, _list_nonlinear_laws(regression, s)) for s in sums]
+        rivals = [s for s, laws in laws_of_sums if len(laws) == 1 and laws[0].effect not in like_laws]
+    is_surpassed = any(improves_significantly(balance.chosen, rival) for rival in rivals)
+    return balance.withdraw_names(SURPASSED_REASON) if is_surpassed else balance
+
+
+def _list_nonlinear_laws(regression: Regression, structure: Structure) -> list[Law]:
+    """List the laws of a structure other than linear ones."""
+    return [regression.laws[index] for index in structure.laws if not regression.laws[index].is_linear]
 
 
 def _list_sums(regression: Regression, chosen: Structure) -> tuple[Regression, list[Structure]]:

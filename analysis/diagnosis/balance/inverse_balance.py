@@ -118,22 +118,17 @@ class InverseBalance:
     ) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
         """Build the blocks of samples to fit and those of held-out samples, which are none unless `uses_held_out`.
         regressors: (n, k) per motion."""
-        regression = self.search.regression
-        motions, solved_column = regression.motions, self.solved_column
+        regression, solved_column = self.search.regression, self.solved_column
         predicted = [columns[:, solved_column] for columns in regression.columns]
-        fit_masks, test_masks = (
-            [
-                motion.mask_valid_samples(mask & is_moving)
-                for motion, mask, is_moving in zip(motions, masks, motion_masks, strict=True)
-            ]
-            for motion_masks in [self._find_moving_samples()]
-            for masks in ([m.fit for m in motions], [m.test for m in motions])
-        )
+        moving_samples = list(zip(regression.motions, self._find_moving_samples(), strict=True))
+        fit_masks = [motion.mask_valid_samples(motion.fit & is_moving) for motion, is_moving in moving_samples]
         mean = float(np.concatenate([target[mask] for target, mask in zip(predicted, fit_masks, strict=True)]).mean())
         scale_and_mean = compute_scale(regressors, fit_masks), mean
-        return build_blocks(regressors, predicted, fit_masks, scale_and_mean), build_blocks(
-            regressors, predicted, test_masks, scale_and_mean
-        ) if uses_held_out else ()
+        fit_blocks = build_blocks(regressors, predicted, fit_masks, scale_and_mean)
+        if not uses_held_out:
+            return fit_blocks, ()
+        test_masks = [motion.mask_valid_samples(motion.test & is_moving) for motion, is_moving in moving_samples]
+        return fit_blocks, build_blocks(regressors, predicted, test_masks, scale_and_mean)
 
     def _find_moving_samples(self) -> list[Mask]:
         """Find the samples whose squared speed exceeds `STILL_SHARE` of its mean: masks (n,) per motion; all samples

@@ -1,9 +1,9 @@
-"""Test the laws of a force balance on held-out data, or else by cross-validation. Begin at `judge_laws`.
+"""Decide which laws of a force balance are named, by their errors on held-out data or else by cross-validation.
 
-Models of real devices rarely reach the sensor noise: a test against it would reject them. A law is named by the
-relative decrease of the squared error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat. 17:1217,
-1989), by its share of the decrease by all laws together, which leave the error `ceiling`, and unless effects of another
-family, or too many, fit about as well (`_find_objection`).
+A law is a term of the balance, such as Coulomb friction. Models of real devices rarely reach the sensor noise: a test
+against it would reject every law. A law is named if it decreases the squared error enough (its gain; interval by block
+bootstrap: Kunsch, Ann. Stat. 17:1217, 1989), also relative to the decrease by all laws together, unless effects of
+another family, or too many of its own, fit about as well (`_find_objection`). Begin at `judge_laws`.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judged_law import (
     FRICTIONS,
+    INSIGNIFICANT_GAIN_OBJECTION,
     SIMULATED_AS,
     JudgedLaw,
     compute_force_ratio,
@@ -38,9 +39,9 @@ from analysis.diagnosis.limits import (
     FURTHER_LAW_SHARE,
     LARGEST_CLASS,
     LARGEST_LAW_FORCE,
-    LAW_CEILING_SHARE,
     LAW_FORCE_SHARE,
-    NAMED_CEILING_SHARE,
+    LAW_REDUCTION_SHARE,
+    NAMED_REDUCTION_SHARE,
     RIVAL_MARGIN,
     SECOND_OF_FAMILY_SHARE,
 )
@@ -48,33 +49,33 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 SHAPE_OBJECTION = "it acts like a named law, and may only correct the shape of that law"
-WEAK_GAIN_OBJECTIONS = (
-    "its gain is too small to be named",
-    "its gain varies too much from stretch to stretch of the recording",
-)
-"""Objections: to a second law of a family; without chosen laws, to a gain of at most, and above, `FURTHER_LAW_GAIN`."""
+"""Objection to a second law of a family."""
+SMALL_GAIN_OBJECTION = "its gain is too small to be named"
+VARYING_GAIN_OBJECTION = "its gain varies too much from stretch to stretch of the recording"
 CONDITION_LAWS = {"condition_dependent_friction", "condition_dependent_damping"}
 """Laws that depend on a recorded condition. They may form a class, although they belong to different families."""
+MOST_FURTHER_LAWS = 8
+"""Largest number of effects outside the chosen structure that are tested. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Balance:
     """Result of the force balance of one axis: the chosen structure, with a test of each of its laws.
 
-    laws: any of the command, then those of the structure by falling gain. further_laws: others that lower its error.
-    linear, error, ceiling: rms error on the test blocks, over the rms of the force about its mean, of mass, damping and
-    stiffness alone, of the chosen structure, of all laws together; all three the cross-validated linear error without a
-    test. complete: of the search. tested: whether the blocks allow a test."""
+    Errors of mass, damping and stiffness alone, of the chosen structure, and of all laws together: rms on the test
+    blocks, over the rms of the force about its mean; without a test, all three are the first, cross-validated."""
 
     search: StructureSearch
     chosen: Structure
     laws: tuple[JudgedLaw, ...]
+    """Any law of the command, then those of the chosen structure, the largest gain first."""
     further_laws: tuple[JudgedLaw, ...]
-    linear: float
+    """Other laws that decrease the error of the chosen structure."""
+    linear_error: float
     error: float
-    ceiling: float
-    complete: bool
-    tested: bool = True
+    all_laws_error: float
+    complete: bool  # as `StructureSearch.complete`
+    tested: bool = True  # whether the blocks allow a test
 
     @property
     def named(self) -> tuple[JudgedLaw, ...]:
@@ -91,7 +92,7 @@ class Balance:
         return replace(self, laws=tuple(replace(law, objection=law.objection or reason) for law in self.laws))
 
     def compute_error(self, law_indices: Sequence[int]) -> float:
-        """Compute the error on the test blocks with laws (indices in the regression), relative as `error`."""
+        """Compute the error with laws (indices in the regression), as `error`."""
         regression = self.search.regression
         return float(np.sqrt(_compute_errors(regression, law_indices).sum() / _sum_power(regression)))
 
@@ -123,21 +124,23 @@ def _find_shared_channels(regression: Regression, law_indices: Sequence[int]) ->
 
 
 def judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
-    """Test each law of `chosen`, and further laws. None is named where those that could be, with linear laws, are less
-    than `NAMED_CEILING_SHARE` of what all laws explain. The divisor of shares is at least 1e-6 of the linear error."""
+    """Test each law of `chosen`, and further laws. None is named where those that could be, with linear laws, explain
+    less than `NAMED_REDUCTION_SHARE` of what all laws do. Shares are divided by at least 1e-6 of the linear error."""
     regression = search.regression
     errors, linear_errors = _compute_errors(regression, chosen.laws), _compute_errors(regression, ())
-    ceiling = _compute_ceiling(regression, errors)
-    decrease = max(float(linear_errors.sum() - ceiling), 1e-6 * float(linear_errors.sum()), 1e-300)
+    all_laws_error = _compute_all_laws_error(regression, errors)
+    decrease = max(float(linear_errors.sum() - all_laws_error), 1e-6 * float(linear_errors.sum()), 1e-300)
     judged = [_judge_law(regression, chosen.laws, index, (errors, decrease)) for index in chosen.laws]
     further_laws = _judge_further_laws(regression, chosen, (errors, decrease))
-    ratios = [float(np.sqrt(error / _sum_power(regression))) for error in (linear_errors.sum(), errors.sum(), ceiling)]
+    linear_rms, chosen_rms, all_laws_rms = (
+        float(np.sqrt(error / _sum_power(regression))) for error in (linear_errors.sum(), errors.sum(), all_laws_error)
+    )
     laws = _name_once_per_family(sorted(judged, key=lambda law: -law.gain))
-    balance = Balance(search, chosen, laws, further_laws, ratios[0], ratios[1], ratios[2], search.complete)
+    balance = Balance(search, chosen, laws, further_laws, linear_rms, chosen_rms, all_laws_rms, search.complete)
     counted = [law.law_index for law in laws if law.named or law.law.is_linear or law.objection == SHAPE_OBJECTION]
-    uncovered = float(_compute_errors(regression, counted).sum() - ceiling) / decrease
+    uncovered = float(_compute_errors(regression, counted).sum() - all_laws_error) / decrease
     reason = f"{100 * min(uncovered, 1.0):.0f} % of what all laws explain would remain: the main cause is another"
-    return balance if uncovered <= 1 - NAMED_CEILING_SHARE else balance.withdraw_names(reason)
+    return balance if uncovered <= 1 - NAMED_REDUCTION_SHARE else balance.withdraw_names(reason)
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
@@ -146,11 +149,8 @@ def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
     results: list[JudgedLaw] = []
     for law in laws:
         similar = [judged for judged in results if judged.named and find_family(judged.law.effect) & {law.law.effect}]
-        results.append(
-            replace(law, objection=SHAPE_OBJECTION)
-            if law.named and similar and law.gain < SECOND_OF_FAMILY_SHARE
-            else law
-        )
+        is_shape_correction = law.named and similar and law.gain < SECOND_OF_FAMILY_SHARE
+        results.append(replace(law, objection=SHAPE_OBJECTION) if is_shape_correction else law)
     return tuple(results)
 
 
@@ -165,7 +165,7 @@ def _compute_errors(regression: Regression, law_indices: Sequence[int]) -> Float
     return regression.compute_test_errors(columns) if blocks is regression.test else regression.cross_validate(columns)
 
 
-def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float:
+def _compute_all_laws_error(regression: Regression, chosen_errors: FloatArray) -> float:
     """Compute the sum of squared errors with all laws together, but at most that of the chosen structure."""
     cross_validated, test_errors = fit_all_laws(regression, range(regression.columns[0].shape[1]))
     error = float(test_errors.sum()) if select_test_blocks(regression) is regression.test else cross_validated
@@ -175,7 +175,7 @@ def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float
 def _judge_law(
     regression: Regression, law_indices: Sequence[int], law_index: int, reference: tuple[FloatArray, float]
 ) -> JudgedLaw:
-    """Test law `law_index` of `law_indices`. reference: squared errors (blocks,) with these; their fall by all laws."""
+    """Test law `law_index` of `law_indices`. reference: squared errors (blocks,) with these; decrease by all laws."""
     full, decrease = reference
     other_laws = tuple(index for index in law_indices if index != law_index)
     reduced = _compute_errors(regression, other_laws)
@@ -238,7 +238,7 @@ def _find_equivalents(
         # Of two equally good laws, the simpler: another family's with more parameters must not have a larger error.
         has_more_parameters = count_parameters(regression, indices[-1:]) > count_parameters(regression, [law_index])
         limit = 0.0 if has_more_parameters and effect not in find_family(tested_law.effect) else RIVAL_MARGIN * decrease
-        if tested_law.effect in FREE_LAWS:  # rivals of a strong law leave at most four times as much
+        if tested_law.effect in FREE_LAWS:  # rivals leave at most 1 / (1 - FREE_LAW_GAIN) times its error
             limit = min(limit, FREE_LAW_GAIN / (1 - FREE_LAW_GAIN) * float(full_errors.sum()))
         if float(increases.sum()) <= limit:
             equivalents.append((float(increases.sum()), effect))
@@ -255,8 +255,8 @@ def _find_objection(
     if values is None:
         return "its parameters have signs that such physics cannot have"
     if gain_low <= 0:
-        return "its gain on held-out data is not larger than its variation between stretches of the recording"
-    if share < LAW_CEILING_SHARE and gain < FURTHER_LAW_SHARE:
+        return INSIGNIFICANT_GAIN_OBJECTION
+    if share < LAW_REDUCTION_SHARE and gain < FURTHER_LAW_SHARE:
         return f"it explains {100 * share:.1f} % of what all laws together explain"
     if law.effect in FREE_LAWS and gain < FREE_LAW_GAIN:
         return "a law that the catalogue lacks is named only where it halves the error on held-out data"
@@ -273,7 +273,7 @@ def _find_objection(
 def _judge_further_laws(
     regression: Regression, chosen: Structure, reference: tuple[FloatArray, float]
 ) -> tuple[JudgedLaw, ...]:
-    """Test the best law of each other effect, eight at most: those with a significant gain, the largest first."""
+    """Test the best law of each other effect: those with a significant gain, the largest first."""
     chosen_errors, decrease = reference
     chosen_effects = {regression.laws[index].effect for index in chosen.laws}
     best_by_effect: dict[str, tuple[float, int]] = {}
@@ -284,17 +284,17 @@ def _judge_further_laws(
         if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
             best_by_effect[law.effect] = error, index
     further_laws = []
-    for _, index in sorted(best_by_effect.values())[:8]:
+    for _, index in sorted(best_by_effect.values())[:MOST_FURTHER_LAWS]:
         errors = _compute_errors(regression, law_indices := (*chosen.laws, index))
         gain, gain_low = bootstrap_gain(chosen_errors, errors)
         values, share = fit_values(regression, law_indices)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
-        objection = ("it explains too little in addition to the other terms" if chosen.laws
-                  else WEAK_GAIN_OBJECTIONS[gain > FURTHER_LAW_GAIN])  # fmt: skip
+        objection = VARYING_GAIN_OBJECTION if gain > FURTHER_LAW_GAIN else SMALL_GAIN_OBJECTION
+        if chosen.laws:
+            objection = "it explains too little in addition to the other terms"
         if gain > 0 and gain_low > 0:
             law = regression.laws[index]
-            is_physical = compute_force_ratio(regression, law_indices, index) <= LARGEST_LAW_FORCE
-            further_law = JudgedLaw(
-                index, law, values, gain, gain_low, share, (), 0.0, objection, is_physical=is_physical
-            )
-            further_laws.append(replace(further_law, formula=law.make_formula(values)))
+            further_laws.append(JudgedLaw(
+                index, law, values, gain, gain_low, share, (), 0.0, objection, formula=law.make_formula(values),
+                is_physical=compute_force_ratio(regression, law_indices, index) <= LARGEST_LAW_FORCE,
+            ))  # fmt: skip
     return tuple(sorted(further_laws, key=lambda judged_law: -judged_law.gain))

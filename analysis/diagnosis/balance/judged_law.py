@@ -21,6 +21,9 @@ from equalizer.signals.signal import FloatArray
 
 NO_COLUMN = -1
 """Value of `JudgedLaw.law_index` for a law of the command: it changes the force itself and has no column."""
+INSIGNIFICANT_GAIN_OBJECTION = (
+    "its gain on held-out data is not larger than its variation between stretches of the recording"
+)
 FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
@@ -64,7 +67,6 @@ class JudgedLaw:
     """Reason not to name the law, as a clause; empty where it is named."""
     stands_for: str = ""
     """Effect that was chosen but has no simulation, where `law` replaces it; else empty."""
-
     formula: Formula | None = None
     """Formula for the simulation of a law that is no effect of the catalogue; else None."""
     is_physical: bool = True

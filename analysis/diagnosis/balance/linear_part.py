@@ -87,7 +87,7 @@ def assign_channels(motions: Sequence[Motion]) -> tuple[int, ...]:
 def compute_errors_without_channel(motions: Sequence[Motion], axis: int, channel_count: int) -> list[float]:
     """Compute, per channel, the cross-validated squared error without that channel's acceleration, over the power of
     the force about its mean."""
-    regression = build_regression(motions, axis, (), turns=False)
+    regression = build_regression(motions, axis, (), turns_freely=False)
     all_columns = regression.select_columns(())
     signal_power = max(sum(block.centred_power for block in regression.fit), 1e-300)
     return [

@@ -39,7 +39,6 @@ class Condition:
     """Name in a formula."""
     mean: float
     standard_deviation: float
-    """Standard deviation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,9 +86,9 @@ class Motion:
         return filter_band_pass(columns, self.rate_hz, self.band_hz, self.lowest_hz)
 
     def mask_valid_samples(self, mask: Mask) -> Mask:
-        """Mask (kept samples,) of the samples in a mask (n,), without `MOTION_EDGE_PERIODS` periods of the band's upper
-        end, but at least one sample, at either end of the part."""
-        edge_samples = int(MOTION_EDGE_PERIODS * self.rate_hz / self.band_hz) + 1
+        """Mask (kept samples,) of the samples in a mask (n,), without `MOTION_EDGE_PERIODS` periods of the band's lower
+        end, or of its upper end where there is no lower one, but at least one sample, at either end of the part."""
+        edge_samples = int(MOTION_EDGE_PERIODS * self.rate_hz / (self.lowest_hz or self.band_hz)) + 1
         interior = np.zeros(len(mask), dtype=np.bool_)
         interior[edge_samples : len(mask) - edge_samples] = True
         return (mask & interior)[:: self.step]
@@ -163,16 +162,8 @@ def compute_motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) ->
         all_power, all_frequencies_hz = np.concatenate(motion_power), np.concatenate(motion_frequencies_hz)
         ascending = np.argsort(all_frequencies_hz)
         cumulative_power = np.cumsum(all_power[ascending])
-        channel_ends_hz.append(
-            float(
-                all_frequencies_hz[ascending][
-                    min(
-                        np.searchsorted(cumulative_power, MOVING_BAND_SHARE * cumulative_power[-1]),
-                        len(all_frequencies_hz) - 1,
-                    )
-                ]
-            )
-        )
+        last_line = min(np.searchsorted(cumulative_power, MOVING_BAND_SHARE * cumulative_power[-1]), len(ascending) - 1)
+        channel_ends_hz.append(float(all_frequencies_hz[ascending][last_line]))
     return max(channel_ends_hz)
 
 
@@ -206,8 +197,12 @@ def _compute_motion(
 
 def filter_band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
     """Filter columns (n, k) to the band from `lowest_hz` to `band_hz` without a phase shift; a low pass where
-    `lowest_hz` is 0. The straight line between their ends is kept."""
-    return filter_spectrum(columns, lambda length: _tabulate_band_gain(length, rate_hz, band_hz, lowest_hz))
+    `lowest_hz` is 0, which keeps the straight line between their ends; any other band excludes their mean."""
+    return filter_spectrum(
+        columns - columns.mean(axis=0) if lowest_hz > 0 else columns,
+        lambda length: _tabulate_band_gain(length, rate_hz, band_hz, lowest_hz),
+        subtract_line=lowest_hz == 0,
+    )
 
 
 @lru_cache(maxsize=8)  # the columns of all laws are filtered alike
@@ -239,8 +234,8 @@ def _differentiate_in_band(
     samples: FloatArray, rate_hz: float, band: tuple[float, float], order: int, advance_s: float
 ) -> FloatArray:
     """Compute (n, k): the time derivative of order `order`; an integral where that is negative. band: upper and lower
-    end in Hz. advance_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered
-    at the lower end of the band; the acceleration itself is not, like the force."""
+    end in Hz. advance_s: time in s by which the result is advanced. Integrals of an acceleration, without its mean (as
+    gravity), are high-pass filtered at the lower end of the band; the acceleration itself is not, like the force."""
     band_hz, lowest_hz = band
     end_line = compute_end_to_end_line(samples)
     slope = (samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz
@@ -257,7 +252,7 @@ def _differentiate_in_band(
         smoothed = _differentiate_in_band(samples, rate_hz, band, 0, advance_s)
         return np.asarray(np.cumsum(smoothed, axis=0) / rate_hz)
     if order < 0:
-        return filter_spectrum(samples, compute_gain, subtract_line=False)
+        return filter_spectrum(samples - samples.mean(axis=0), compute_gain, subtract_line=False)
     derivative = filter_spectrum(samples - end_line, compute_gain, subtract_line=False)
     if order == 0:
         return np.asarray(derivative + end_line + slope * advance_s)

@@ -52,9 +52,8 @@ class Regression:
     matrix_column_count: int
     """Number of mass, damping and stiffness columns, or of columns of a given model."""
     nonnegative_columns: tuple[int, ...]
-    """Columns whose weights must not be negative: mass and damping of the driven motion. `_solve_nonnegative` makes one
-    step fewer than there are entries. Therefore the mass is listed twice, and a given model, whose prior fixes that
-    weight, has a single entry."""
+    """Columns whose weights must not be negative: mass and damping of the driven motion; none of a given model, whose
+    prior bounds the weights."""
     column_ranges: tuple[slice, ...]
     """Range of columns of each law, by its index in `laws`."""
     scale: FloatArray
@@ -108,7 +107,7 @@ class Regression:
         weights = solve_normal_equations(products, RIDGE)
         nonnegative = list(self.nonnegative_columns)
         is_fixed: Mask = np.zeros_like(weights, dtype=np.bool_)
-        for _ in range(len(nonnegative) - 1):
+        for _ in nonnegative:
             is_negative = weights[..., nonnegative] < 0
             if not is_negative.any():
                 break
@@ -131,18 +130,20 @@ def build_regression(
     motions: Sequence[Motion],
     axis: int,
     laws: Sequence[Law],
-    turns: bool,
+    turns_freely: bool,
     base_terms: BaseTerms | None = None,
     bases: Sequence[FloatArray] | None = None,
 ) -> Regression:
-    """Build the regression of one axis's force on mass, damping, stiffness and laws. turns: whether the shaft turns
-    freely (`Scales.turns`) and so has no stiffness. base_terms: further terms of the base; None = none, and the force
-    drives the motion channel of the same index, or the last. bases: columns (n, k) per motion that replace all of the
-    base but the constant. Laws whose columns vanish or are not finite are left out."""
+    """Build the regression of one axis's force on mass, damping, stiffness and laws. turns_freely: whether the axis has
+    no stiffness (`Scales.turns_freely`). base_terms: further terms of the base; None = none, and the force drives the
+    motion channel of the same index, or the last. bases: columns (n, k) per motion that replace all of the base but the
+    constant. Laws whose columns vanish or are not finite are left out."""
     channel_count = len(motions[0].channels)
     base_terms = base_terms or BaseTerms(min(axis, channel_count - 1))
     forces = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
-    linear = [_make_linear_columns(motion, turns, base_terms.laws) for motion in motions] if bases is None else bases
+    linear = (
+        [_make_linear_columns(motion, turns_freely, base_terms.laws) for motion in motions] if bases is None else bases
+    )
     column_parts = [[_make_base_columns(motion, columns) for motion, columns in zip(motions, linear, strict=True)]]
     kept_laws, column_ranges, next_column = [], [], column_parts[0][0].shape[1]
     base_column_count = next_column
@@ -161,8 +162,8 @@ def build_regression(
     driven = base_terms.driven_channel
     return Regression(
         tuple(motions), axis, tuple(kept_laws), base_terms, base_column_count,
-        (2 if turns else 3) * channel_count if bases is None else base_column_count - 1,
-        (driven, channel_count + driven, driven) if bases is None else (0,), tuple(column_ranges),
+        (2 if turns_freely else 3) * channel_count if bases is None else base_column_count - 1,
+        (driven, channel_count + driven) if bases is None else (), tuple(column_ranges),
         scale, rows, tuple(forces),
         build_blocks(rows, forces, fit_masks, (scale, mean)), build_blocks(rows, forces, test_masks, (scale, mean)),
     )  # fmt: skip
@@ -173,11 +174,11 @@ def compute_signal_power(blocks: Sequence[Block]) -> float:
     return sum(block.centred_power for block in blocks)
 
 
-def _make_linear_columns(motion: Motion, turns: bool, linear_laws: Sequence[Law]) -> FloatArray:
+def _make_linear_columns(motion: Motion, turns_freely: bool, linear_laws: Sequence[Law]) -> FloatArray:
     """Make (n, k): columns of acceleration, velocity, position and linear laws; no position where a shaft turns freely,
     because it has no stiffness."""
     law_columns = [law.make_columns(motion, law.numbers) for law in linear_laws]
-    return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *law_columns])
+    return np.hstack([motion.acceleration, motion.velocity, *([] if turns_freely else [motion.position]), *law_columns])
 
 
 def _make_base_columns(motion: Motion, linear: FloatArray) -> FloatArray:

@@ -25,7 +25,7 @@ from analysis.diagnosis.limits import (
     FURTHER_LAW_GAIN,
     FURTHER_LAW_SHARE,
     MOST_SUMMED_LAWS,
-    PLAINER_SHORTFALL,
+    SIMPLER_SHORTFALL,
     STRUCTURES_BEAM,
 )
 from analysis.diagnosis.types import TimeBudget
@@ -76,7 +76,7 @@ def search_structures(
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     scales = [measure_scales(motions, c, rotational) for c in range(len(motions[0].channels))]
-    turns = any(scale.turns for scale in scales)
+    turns_freely = any(scale.turns_freely for scale in scales)
     base_laws = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
     candidate_laws = [
         law
@@ -89,7 +89,7 @@ def search_structures(
             base_only = _fit_linear_structure(regression)
             return StructureSearch(regression, base_only, base_only, (base_only,), True)
     else:
-        regression = build_regression(motions, axis, candidate_laws, turns, base)
+        regression = build_regression(motions, axis, candidate_laws, turns_freely, base)
     if "cogging" not in excluded:
         regression = _add_cogging_laws(regression, scales)
     linear = _fit_linear_structure(regression)
@@ -252,7 +252,7 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 
 def choose_simplest_structure(search: StructureSearch) -> Structure:
     """Choose the sum with the fewest parameters at about the least error; add laws that explain most of the rest."""
-    limit = search.best.error + PLAINER_SHORTFALL * (search.linear.error - search.best.error)
+    limit = search.best.error + SIMPLER_SHORTFALL * (search.linear.error - search.best.error)
     sums = [s for s in search.ranked if s.error <= limit]
     simplest = min(sums, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=search.linear)
     least_error = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
@@ -261,9 +261,9 @@ def choose_simplest_structure(search: StructureSearch) -> Structure:
     return simplest
 
 
-def add_further_laws(search: StructureSearch, base: Structure, ceiling: float) -> Structure | None:
-    """Add laws to `base` that explain most of what all laws (error: ceiling) could explain; None without such laws."""
-    limit = base.error - max(FURTHER_LAW_EXCESS * (base.error - ceiling), FURTHER_LAW_SHARE * base.error)
+def add_further_laws(search: StructureSearch, base: Structure, all_laws_error: float) -> Structure | None:
+    """Add laws to `base` that explain most of what all laws together could explain; None without such laws."""
+    limit = base.error - max(FURTHER_LAW_EXCESS * (base.error - all_laws_error), FURTHER_LAW_SHARE * base.error)
     extensions = [
         s
         for s in search.ranked

@@ -39,7 +39,7 @@ from analysis.diagnosis.confirm.laws_for_simulation import (
 from analysis.diagnosis.confirm.require_gain import CONSTANT_FORCE
 from analysis.diagnosis.errors.hypothesis import combine_hypotheses
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.limits import CONFIRMED_RATIO, HELD_OUT_ERROR, INTERVAL_FACTOR
+from analysis.diagnosis.limits import CONFIRMED_RATIO, HELD_OUT_ERROR, INTERVAL_HALF_WIDTH
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import compute_final_errors
@@ -49,11 +49,8 @@ from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
-INTERVAL_HALF_WIDTH = 1.96 * INTERVAL_FACTOR
-"""Half-width of a 95 % interval in standard errors, widened as in `identifiability`. A positive parameter is fitted as
-its logarithm: if the half-width is at least 1, the parameter counts as undetermined."""
-_NamedLaws = list[tuple[int, JudgedLaw]]
-"""(axis index, law named on that axis) each."""
+_NamedLaw = tuple[int, JudgedLaw]
+"""Index of an axis, and a law named on it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,8 +108,8 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise
 
 
 def _confirm_by_simulation(
-    start: _ConfirmationStart, named_laws: Sequence[tuple[int, JudgedLaw]]
-) -> tuple[SearchResult, _NamedLaws] | None:
+    start: _ConfirmationStart, named_laws: Sequence[_NamedLaw]
+) -> tuple[SearchResult, list[_NamedLaw]] | None:
     """Fit the laws until all are confirmed. Undetermined ones are dropped or replaced by a special case; the last one
     is dropped where too little held-out error is explained. Returns the result and these laws; None where none is
     left."""
@@ -122,28 +119,27 @@ def _confirm_by_simulation(
         explanation = Explanation(
             start.as_given, start.tested, with_laws, tuple((step,) for step in steps), tuple(steps)
         )
-        undetermined: int | None = len(named_laws) - 1
+        undetermined_index: int | None = len(named_laws) - 1
         errors: FloatArray | None = None
         if _lowers_held_out_error(start.baseline, with_laws) and explains_half(context.full_measure, with_laws):
             errors = compute_final_errors(context, explanation)
-            undetermined = _find_undetermined_law(
+            undetermined_index = _find_undetermined_law(
                 explanation, errors[len(context.tuning.names) :], start.constant_count
             )
-        if undetermined is None:
+        if undetermined_index is None:
             test_error = float(np.nanmax(with_laws.score.test, initial=0.0))
             is_complete = start.noise_known and is_near_noise(explanation) and test_error <= HELD_OUT_ERROR
             judgement = Judgement("explained" if is_complete else "partly_explained", True)
             return SearchResult(start.search_context, explanation, judgement, errors=errors), named_laws
-        special_case = (
-            None
-            if errors is None
-            else find_special_case(start.balances, _remove_law(named_laws, undetermined), named_laws[undetermined])
-        )
-        named_laws = refit_laws(start.balances, _remove_law(named_laws, undetermined, special_case))
+        special_case = None
+        if errors is not None:
+            remaining_laws = _remove_law(named_laws, undetermined_index)
+            special_case = find_special_case(start.balances, remaining_laws, named_laws[undetermined_index])
+        named_laws = refit_laws(start.balances, _remove_law(named_laws, undetermined_index, special_case))
     return None
 
 
-def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_laws: _NamedLaws) -> SearchResult:
+def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_laws: list[_NamedLaw]) -> SearchResult:
     """Replace a law by its special case where its further parameters are undetermined (such as a stiffness before
     sliding), no law is lost, and the held-out error rises by at most the factor 1 / CONFIRMED_RATIO; else unchanged."""
     for index in find_open_refinements(result, start.constant_count):
@@ -160,7 +156,7 @@ def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_
     return result
 
 
-def _remove_law(named_laws: _NamedLaws, index: int, replacement: tuple[int, JudgedLaw] | None = None) -> _NamedLaws:
+def _remove_law(named_laws: list[_NamedLaw], index: int, replacement: _NamedLaw | None = None) -> list[_NamedLaw]:
     """Remove the named law at `index`, or put `replacement` in its place."""
     return [*named_laws[:index], *([] if replacement is None else [replacement]), *named_laws[index + 1 :]]
 
@@ -169,7 +165,7 @@ def _fit_from_starts(
     context: SearchContext,
     balances: Sequence[Balance],
     reference_fits: tuple[FittedCandidate, FittedCandidate],
-    named_laws: Sequence[tuple[int, JudgedLaw]],
+    named_laws: Sequence[_NamedLaw],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
     """Fit the laws one after the other; returns the fit after each law, and the last of them scored on the held-out
     samples too. They start from the linear parameters of the balance, or, where that fit is not confirmed, from those
@@ -189,7 +185,7 @@ def _fit_from_starts(
 def _fit_steps(
     context: SearchContext,
     retuned: FittedCandidate,
-    named_laws: Sequence[tuple[int, JudgedLaw]],
+    named_laws: Sequence[_NamedLaw],
     deviations: FloatArray,
 ) -> list[FittedCandidate]:
     """Fit with the laws added one after the other; for each constant force before them, the re-tuned model is returned.
@@ -219,7 +215,7 @@ def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constan
         any_suffices = (
             index > constant_count and law_families[index] in law_families[constant_count:index]
         ) or claim.effect.law is not None
-        undetermined: list[bool] = []
+        may_vanish: list[bool] = []
         zero_by_name: dict[str, bool] = {}
         for parameter_index, parameter in enumerate(free_parameters, first_parameter):
             vanishing_distance = {
@@ -228,13 +224,14 @@ def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constan
                 "linear": np.inf,
             }[parameter.scale]
             if any_suffices or parameter.none is not None:
-                undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance < np.inf)
+                reaches_vanishing = INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance
+                may_vanish.append(bool(np.isfinite(vanishing_distance) and reaches_vanishing))
             if claim.effect.simpler and parameter.scale == "signed":
                 zero_by_name[parameter.name] = INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance
         if index >= constant_count and (
-            any(undetermined)
+            any(may_vanish)
             if any_suffices
-            else _has_only_true(undetermined) or _may_be_special_case(claim.effect, zero_by_name)
+            else _has_only_true(may_vanish) or _may_be_special_case(claim.effect, zero_by_name)
         ):
             return index - constant_count
         first_parameter += len(free_parameters)
@@ -281,7 +278,8 @@ def find_open_refinements(result: SearchResult, constant_count: int) -> tuple[in
 
 
 def _find_open_parameters(result: SearchResult) -> list[int]:
-    """Find the indices of the positive parameters, over all claims in their order, whose intervals reach zero."""
+    """Find the indices of the positive parameters, over all claims in their order, whose intervals reach zero: they are
+    fitted as logarithms, so that this is a half width of at least 1."""
     assert result.errors is not None
     fitted_parameters = result.found.steps[-1].fitted.hypothesis.parameters
     errors = result.errors[len(result.context.tuning.names) :]

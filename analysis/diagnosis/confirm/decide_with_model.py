@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import SIMULATED_AS
+from analysis.diagnosis.balance.judged_law import INSIGNIFICANT_GAIN_OBJECTION, SIMULATED_AS
 from analysis.diagnosis.confirm.balance_with_model import find_balances_with_model
 from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
@@ -24,8 +24,8 @@ from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.limits import (
     CANDIDATES_WITH_GAIN,
     FURTHER_LAW_SHARE,
-    NAMED_CEILING_SHARE,
     NAMED_ERROR,
+    NAMED_REDUCTION_SHARE,
 )
 from analysis.diagnosis.search.parsimony import is_refined_candidate
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
@@ -78,7 +78,7 @@ def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     """Find the reason not to name the effects that were found, as a clause; empty where they are named. Conditions in
     order: an effect; data held out; gain above its variation and above `FURTHER_LAW_SHARE`; no parameter at its
     tolerance; better than the best rival; confirmed by the force balance, where the gain is below
-    `NAMED_CEILING_SHARE`."""
+    `NAMED_REDUCTION_SHARE`."""
     context, explanation = result.context, result.found
     if not explanation.steps:
         return "it explains too little of the error to be added"
@@ -88,7 +88,7 @@ def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     if total_gain is None or last_gain is None:
         return "too little data was held out to confirm it"
     if min(total_gain.low, last_gain.low) <= 0:
-        return "its gain on held-out data is not larger than its variation between stretches of the recording"
+        return INSIGNIFICANT_GAIN_OBJECTION
     if min(total_gain.gain, last_gain.gain) < FURTHER_LAW_SHARE:
         return (
             f"on held-out data it explains {100 * min(total_gain.gain, last_gain.gain):.1f} % of the error's power, "
@@ -100,7 +100,7 @@ def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     if rival is not None and _is_indistinguishable(context, rival, explanation.after):
         return f"these data cannot distinguish it from {rival.newest.replace('_', ' ')}"
     claims = explanation.after.fitted.hypothesis.claims
-    if total_gain.gain < NAMED_CEILING_SHARE and not all(_is_named_by_balance(claim, balances) for claim in claims):
+    if total_gain.gain < NAMED_REDUCTION_SHARE and not all(_is_named_by_balance(claim, balances) for claim in claims):
         return "it explains less than half of the error's power, and the force balance does not confirm it"
     return ""
 
@@ -167,5 +167,5 @@ def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[UnconfirmedEff
 def _explain_not_best(gain: HeldOutGain) -> str:
     """Explain, as a clause, why a candidate other than the best is not named."""
     if gain.low <= 0:
-        return "its gain on held-out data is not larger than its variation between stretches of the recording"
+        return INSIGNIFICANT_GAIN_OBJECTION
     return "another candidate has a smaller error on the data that were fitted"

@@ -29,6 +29,8 @@ CONSTANT_ADDED = (
     "device."
 )
 """Remark of a diagnosis whose measure has such a constant."""
+LEAST_STIFFNESS_RATIO = 1e-6
+"""Ratio of the smallest to the largest singular value of the stiffness above which it holds a position. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +39,7 @@ class FittingMeasure:
 
     model: MechanicalModel
     chosen: MeasureChoice
-    narrow: bool = False
+    is_narrow_band: bool = False
     """Whether the band is limited to small noise in the force, which may leave parameters of laws undetermined."""
     is_reduced: bool = False
     """Whether the force of further motions, modes and a delay was subtracted from the commands. Only set by
@@ -93,11 +95,6 @@ def _compute_error_over_noise(model: MechanicalModel, chosen: MeasureChoice) -> 
     tuning = make_tuning(model, measure.records[0].recording.command.channels)
     nominal_fit = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
     return compute_fit_score(measure, nominal_fit.residuals).worst_channel
-
-
-LEAST_STIFFNESS_RATIO = 1e-6
-"""Ratio of the smallest to the largest singular value of the stiffness above which it holds a position; chosen by
-hand."""
 
 
 def shift_to_operating_point(recordings: Sequence[Recording], model: MechanicalModel) -> tuple[Recording, ...] | None:

@@ -61,7 +61,7 @@ def list_fitting_measures(
             if isinstance(narrow_band_choice.measure, PredictedForce):
                 power_share = compute_law_power_share(balances, narrow_band_choice.measure.band_hz)
             if power_share >= LAW_BAND_POWER_SHARE:
-                yield FittingMeasure(linear_model, narrow_band_choice, narrow=True)
+                yield FittingMeasure(linear_model, narrow_band_choice, is_narrow_band=True)
             band_hz = balances[0].search.regression.motions[0].band_hz
             yield FittingMeasure(linear_model, make_force_measure(reduced_recordings, linear_model, band_hz))
     except (MechanicalModelError, np.linalg.LinAlgError):

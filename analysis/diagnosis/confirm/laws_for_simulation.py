@@ -37,6 +37,8 @@ _SIGNAL_PREFIX = {"q": "", "v": "v", "f": "f"}
 """Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance."""
 _EXTREME_MAGNITUDE = 1e30
 """Limit of a parameter that is not in SI; its reciprocal is the least positive value. Beyond any unit of a device."""
+_LARGEST_STARTING_DEVIATION = 3.9
+"""Largest starting deviation of a model parameter, in standard deviations: just within `RETUNING_BOUND`."""
 
 
 def write_law(formula: Formula, axis_letter: str) -> Law:
@@ -169,8 +171,8 @@ def make_hypothesis(
 def compute_starting_deviations(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Compute the starting deviations of mass, damping and stiffness, in standard deviations: from the model's values
     to those that the balance fits together with the laws. Zeros unless there is a single balance, without a given
-    model, and the model has one coordinate. A mass is at least a tenth of the model's (chosen); deviations are clipped
-    to +-3.9, just within `RETUNING_BOUND` = 4. laws: indices of the named laws in the regression."""
+    model, and the model has one coordinate. A mass is at least a tenth of the model's (chosen). laws: indices of the
+    named laws in the regression."""
     deviations = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):
         return deviations
@@ -185,5 +187,5 @@ def compute_starting_deviations(tuning: Tuning, balances: Sequence[Balance], law
             continue
         if parameter_index == 0:
             weight = max(weight, matrix[0, 0] / 10)
-        deviations[parameter_index] = np.clip((weight - matrix[0, 0]) / tuning.deviation[parameter_index], -3.9, 3.9)
-    return deviations
+        deviations[parameter_index] = (weight - matrix[0, 0]) / tuning.deviation[parameter_index]
+    return np.clip(deviations, -_LARGEST_STARTING_DEVIATION, _LARGEST_STARTING_DEVIATION)

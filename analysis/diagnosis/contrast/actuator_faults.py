@@ -42,6 +42,12 @@ CommandChange = Callable[[FloatArray, float], FloatArray]
 SIZE_RANGE = (0.75, 1.35)
 """Range of sizes within which a change that is nonlinear in its size is scaled, before it is linearised about another
 size."""
+GAIN_SIZE_RANGE, LIMIT_SIZE_RANGE = (-0.9, 20.0), (0.6, 1.5)
+"""Ranges of sizes of a gain, and of a saturation or slew limit."""
+SATURATION_QUANTILES, SATURATION_SHARES = (0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98), (0.5, 0.6, 0.7, 0.8, 0.9)
+"""Tried limits of a saturation: quantiles of the command's magnitude, and shares of the largest command."""
+LARGEST_SATURATION_SHARE = 0.995
+"""Share of the largest command from which a limit saturates too few samples to be tried."""
 GRID_SIZE = 12
 """Number of sizes on a logarithmic grid; for delays, the least number."""
 EARLIER_DRIFT_SHARES = (0.0, 0.25, 0.5)
@@ -92,8 +98,10 @@ def make_actuator_faults(
         *(replace(fix_size(_make_delay(axis, time_s), lags.step_s), column_change=None) for time_s in lags.delays_s),
     ])  # fmt: skip
     yield axis.make_fault("amplifier_lag", [_make_lag(axis, time_s) for time_s in delays_s])
-    command_shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / peak
-    limits = sorted(peak * share for share in (*command_shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
+    saturation_shares = (np.quantile(np.abs(commands), np.array(SATURATION_QUANTILES)) / peak).tolist()
+    limits = sorted(
+        peak * share for share in (*saturation_shares, *SATURATION_SHARES) if 0 < share < LARGEST_SATURATION_SHARE
+    )
     yield axis.make_fault("force_saturation", [_make_saturation(axis, limit) for limit in limits])
     fastest_rate = max(
         float(np.abs(np.diff(part.command[:, axis_index])).max(initial=0.0)) * part.rate_hz for part in parts
@@ -117,8 +125,8 @@ def _make_gain_faults(axis: _Axis, by_force: bool) -> Iterator[Fault]:
         return 1 / (1 + size) if by_force else 1 + size
 
     yield axis.make_fault("force_gain", [
-        Variant((axis.make_undo(lambda u, rate: 2 * u),), lambda s: {"gain": compute_gain(float(s[0]))}, -0.9, 20.0,
-                column_change=lambda x, rate, part: 2 * x),
+        Variant((axis.make_undo(lambda u, rate: 2 * u),), lambda s: {"gain": compute_gain(float(s[0]))},
+                *GAIN_SIZE_RANGE, column_change=lambda x, rate, part: 2 * x),
     ])  # fmt: skip
     drifts = [
         _make_gain_drift(axis, earlier_share, lambda s: {"change": compute_gain(float(s[0])) - 1})
@@ -142,7 +150,10 @@ def _make_gain_drift(axis: _Axis, earlier_share: float, parameters_of: Parameter
         return replace(part, command=command)
 
     return Variant(
-        (undo,), parameters_of, -0.9, 20.0, column_change=lambda x, rate, part: x * compute_gain_ramp(part, len(x))
+        (undo,),
+        parameters_of,
+        *GAIN_SIZE_RANGE,
+        column_change=lambda x, rate, part: x * compute_gain_ramp(part, len(x)),
     )
 
 
@@ -180,13 +191,14 @@ def _make_lag(axis: _Axis, time_s: float) -> Variant:
 
 def _make_saturation(axis: _Axis, limit: float) -> Variant:
     """Make the variant of a saturation at +-limit, in the command's unit."""
-    return Variant((axis.make_undo(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
+    undo = axis.make_undo(lambda u, rate: np.clip(u, -limit, limit))
+    return Variant((undo,), lambda s: {"limit": limit}, *LIMIT_SIZE_RANGE)
 
 
 def _make_slew_limit(axis: _Axis, limit: float) -> Variant:
     """Make the variant of a slew-rate limit, in the command's unit per second."""
     undo = axis.make_undo(lambda u, rate: limit_slew(u, 1 / rate, limit, float(u[0]), at_end=True))
-    return Variant((undo,), lambda s: {"rate": limit}, 0.6, 1.5)
+    return Variant((undo,), lambda s: {"rate": limit}, *LIMIT_SIZE_RANGE)
 
 
 def _make_deadband(axis: _Axis, width: float) -> Variant:

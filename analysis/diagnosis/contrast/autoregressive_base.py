@@ -33,7 +33,7 @@ class AutoregressiveBase:
     """n: number of past samples of responses and commands that predict, in decimated samples; at least 2."""
     step: int
     """Decimation step, after a low pass."""
-    responses: int
+    response_count: int
     """Number of response channels."""
 
     def build_rows(
@@ -45,7 +45,7 @@ class AutoregressiveBase:
 
     def mask_command_columns(self, width: int) -> Mask:
         """Mask (width,) of the columns of rows that are made from commands. width: 1 + number of regressors."""
-        return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
+        return (np.arange(width) > self.order * self.response_count) & (np.arange(width) < width - 1)
 
     def mask_valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         """Per part (n,): mask of the rows whose own and past samples are known, without the first two and last two. A
@@ -87,7 +87,7 @@ class AutoregressiveBase:
 
     def reconstruct_response(self, rows: FloatArray) -> FloatArray:
         """Recover the response (n,) from rows: second difference + previous value + previous difference."""
-        return np.asarray(rows[:, 0] + rows[:, 1 + self.channel] + rows[:, 1 + self.responses + self.channel])
+        return np.asarray(rows[:, 0] + rows[:, 1 + self.channel] + rows[:, 1 + self.response_count + self.channel])
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:

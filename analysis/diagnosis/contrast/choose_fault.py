@@ -32,9 +32,7 @@ from analysis.diagnosis.limits import (
 
 T_QUANTILE = float(stdtrit(FOLDS - 1, 0.975))
 """Half-width of a 95 % confidence interval in standard errors: quantile 0.975 of Student's t with FOLDS - 1 degrees of
-freedom. A fault is not named where the interval of its first parameter includes 0, or 1 for a gain. A bandwidth is
-infinite without the fault, but has the relative error of its time constant; a limit, rate or position is fixed by the
-variant, without an error, and passes."""
+freedom."""
 ALIASES = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
@@ -147,6 +145,8 @@ def _find_objection(candidate: JudgedFault, sets_differ: bool) -> str:
             f"its gain between stretches of one set is {candidate.control_gain:.2g} already, and "
             f"{candidate.gain:.2g} between the two sets"
         )
+    # A bandwidth is infinite without the fault, but has the relative error of its time constant, and is compared with
+    # 0 too; a limit, rate or position is fixed by the variant, without an error, and passes.
     main_parameter, value = next(iter(candidate.values.items()))
     distance_from_no_fault = abs(value - (1.0 if main_parameter == "gain" else 0.0))
     if distance_from_no_fault <= T_QUANTILE * candidate.standard_errors[main_parameter]:

@@ -34,8 +34,8 @@ REACH = 2 * CONTRAST_WHITENING_ORDER
 """Rows left out at the ends of a part and near rare gaps: the range of the whitening filter, which starts from rest,
 and of the differentiation. On real recordings, errors there were up to 20 times the rms."""
 LEAST_ROWS = CONTRAST_BLOCKS * REACH
-"""Least rows of each set. A block must be longer than the correlation time of the errors: otherwise resampling is
-invalid."""
+"""Smallest number of rows of a set. A block must be longer than the correlation time of the errors: otherwise
+resampling is invalid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +53,7 @@ class RecordingSet:
     """(valid samples, 1 + columns): the rows, whitened and scaled."""
 
     @property
-    def count(self) -> int:
+    def valid_row_count(self) -> int:
         """Number of valid rows, over all parts."""
         return sum(int(mask.sum()) for mask in self.masks)
 
@@ -85,7 +85,7 @@ class ComparedBase:
     """Number of rows next to a gap that are left out: `REACH`, or 0 where gaps are frequent."""
 
     @property
-    def row_s(self) -> float:
+    def step_s(self) -> float:
         """Time from one row to the next, in s."""
         base = self.base
         return 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / self.clean.parts[0].rate_hz
@@ -241,10 +241,10 @@ def _add_fault_to_regressors(base: ForceBase, data: RecordingSet, change: Column
 def _undo_in_recordings(compared: ComparedBase, data: RecordingSet, undo: Undo) -> UndoneRows:
     """Undo a fault in a set's parts and build their rows."""
     undone = tuple(undo(part) for part in data.parts)
-    same_motion = all(
+    has_same_response = all(
         undone_part.response is original.response for undone_part, original in zip(undone, data.parts, strict=True)
     )
-    rows = compared.base.build_rows(undone, data.rows if same_motion else None)
+    rows = compared.base.build_rows(undone, data.rows if has_same_response else None)
     has_same_known = all(
         undone_part.known is original.known for undone_part, original in zip(undone, data.parts, strict=True)
     )

@@ -32,7 +32,7 @@ class ForceBase:
     """Laws in addition to mass, damping, stiffness and constant; may be empty."""
     band_hz: float
     """Upper end of the band (Hz) to which force and columns are filtered."""
-    is_free_rotation: bool
+    turns_freely: bool
     """Whether a shaft rotates freely, so that the balance has no stiffness (see `Scales`)."""
     rate_hz: float
     """Sample rate of the rows (Hz), after decimation."""
@@ -59,7 +59,7 @@ class ForceBase:
             )
         motions = compute_motions([part.to_observed() for part in parts], self.band_hz)
         force_columns = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
-        base_regression = build_regression(motions, self.axis, (), self.is_free_rotation)
+        base_regression = build_regression(motions, self.axis, (), self.turns_freely)
         part_rows = []
         for force_column, motion, linear_columns in zip(force_columns, motions, base_regression.columns, strict=True):
             law_columns = [motion.decimate(law.make_columns(motion, law.numbers)) for law in self.laws]
@@ -80,8 +80,8 @@ def build_force_base(motions: Sequence[Motion], axis: int, is_rotational: bool) 
     """Build the nominal model of one axis: select laws first among the general laws, then with cogging at the pitches
     that the residual force shows. motions: of the compared recordings."""
     scales = [measure_scales(motions, channel, is_rotational) for channel in range(len(motions[0].channels))]
-    is_free_rotation = any(scale.turns for scale in scales)
-    regression = build_regression(motions, axis, list(make_laws(motions, is_rotational)), is_free_rotation)
+    turns_freely = any(scale.turns_freely for scale in scales)
+    regression = build_regression(motions, axis, list(make_laws(motions, is_rotational)), turns_freely)
     residuals = regression.compute_residuals(regression.select_columns(_select_laws(regression)))
     cogging_laws = [
         make_cogging_law(channel, pitch, scale)
@@ -89,12 +89,12 @@ def build_force_base(motions: Sequence[Motion], axis: int, is_rotational: bool) 
         for pitch in find_likely_pitches(motions, residuals, channel, scale)
     ]
     if cogging_laws:
-        regression = build_regression(motions, axis, (*regression.laws, *cogging_laws), is_free_rotation)
+        regression = build_regression(motions, axis, (*regression.laws, *cogging_laws), turns_freely)
     return ForceBase(
         axis,
         keep_laws(regression, _select_laws(regression)).laws,
         motions[0].band_hz,
-        is_free_rotation,
+        turns_freely,
         motions[0].rate_hz / motions[0].step,
         motions[0].lowest_hz,
     )

@@ -21,7 +21,7 @@ from equalizer.signals.signal import FloatArray
 
 ColumnIndices = npt.NDArray[np.intp]
 RIDGE = 1e-9
-"""Ridge, relative to the mean diagonal element of the Gram matrix. By hand."""
+"""Ridge, relative to the mean diagonal element of a Gram matrix or Hessian. By hand."""
 LARGEST_PRODUCT = 1e16
 """Magnitude of an element of a Gram matrix from which undoing a fault counts as ill-conditioned. By hand."""
 MOST_NEWTON_STEPS = 3
@@ -119,9 +119,8 @@ class SizeFit:
 
 def fit_sizes(pairs: Sequence[SetPair], variant: Variant | None) -> SizeFit:
     """Fit the sizes by at most `MOST_NEWTON_STEPS` Gauss-Newton steps within the variant's bounds, with every base
-    fitted to both sets, until the sizes change by less than 1e-6 (relative). The Hessian gets a ridge of 1e-9 of its
-    mean diagonal element. variant: None = no fault. Raises numpy.linalg.LinAlgError where the normal equations are
-    singular."""
+    fitted to both sets, until the sizes change by less than 1e-6 (relative). variant: None = no fault. Raises
+    numpy.linalg.LinAlgError where the normal equations are singular."""
     if variant is None:
         return _fit_bases(pairs, np.zeros(0))
     sizes = _find_starting_sizes(variant)
@@ -131,7 +130,7 @@ def fit_sizes(pairs: Sequence[SetPair], variant: Variant | None) -> SizeFit:
             gradient, hessian = _compute_newton_terms(pair, sizes)
             gradient_sum += gradient
             hessian_sum += hessian
-        hessian_sum += 1e-9 * max(float(np.trace(hessian_sum)) / len(hessian_sum), 1e-300) * np.eye(len(hessian_sum))
+        hessian_sum += RIDGE * max(float(np.trace(hessian_sum)) / len(hessian_sum), 1e-300) * np.eye(len(hessian_sum))
         updated_sizes = np.clip(
             sizes - np.linalg.solve(hessian_sum, gradient_sum), variant.lower_bound, variant.upper_bound
         )

@@ -28,7 +28,7 @@ def suggest_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...
     delays_s = []
     for compared in _select_device_bases(compared_bases):
         delay_rows = _estimate_delay_rows(compared)
-        delays_s += [float(delay_rows + offset) * compared.row_s for offset in _list_row_offsets() if delay_rows]
+        delays_s += [float(delay_rows + offset) * compared.step_s for offset in _list_row_offsets() if delay_rows]
     return tuple(dict.fromkeys(delays_s))
 
 
@@ -108,7 +108,7 @@ def _correlate_blocks(compared: ComparedBase, from_file_start: bool) -> tuple[Fl
     from_file_start: as in `ClockRate`: whether times are counted from the start of the file, else of each part."""
     past_rows = compared.base.order if isinstance(compared.base, AutoregressiveBase) else 0
     starts = [
-        past_rows + (part.start / (part.rate_hz * compared.row_s) if from_file_start else 0.0)
+        past_rows + (part.start / (part.rate_hz * compared.step_s) if from_file_start else 0.0)
         for part in compared.faulty.parts
     ]
     row_count = sum(len(rows) for rows in compared.faulty.rows)

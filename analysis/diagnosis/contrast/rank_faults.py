@@ -98,9 +98,9 @@ def _prepare_bases(
     for base in build_sensor_bases(clean, band_hz, step):
         with suppress(ValueError):  # too few valid rows: the other bases are compared
             compared_bases.append(compare_base(base, clean, faulty))
-    row_s = compared_bases[0].row_s
-    lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
-    lags = Lags(lag_samples, suggest_delays_s(compared_bases), DELAY_STEP * row_s, suggest_clock_rates(compared_bases))
+    step_s = compared_bases[0].step_s
+    lag_samples = 1 if by_force else round(step_s * clean[0].rate_hz)
+    lags = Lags(lag_samples, suggest_delays_s(compared_bases), DELAY_STEP * step_s, suggest_clock_rates(compared_bases))
     faults: list[Fault] = []
     rotational = recording.is_rotational
     for axis, name in enumerate(recording.command.channels):
@@ -121,8 +121,8 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], fault_fits: FaultFits)
     """Judge all fitted faults, the smallest error first, and compute the errors with no fault undone."""
     unchanged_pairs = fault_fits.unchanged_pairs
     baseline_fit = fit_sizes(unchanged_pairs, None)
-    faulty_sample_count = sum(compared.faulty.count for compared in compared_bases)
-    sample_count = faulty_sample_count + sum(compared.clean.count for compared in compared_bases)
+    faulty_sample_count = sum(compared.faulty.valid_row_count for compared in compared_bases)
+    sample_count = faulty_sample_count + sum(compared.clean.valid_row_count for compared in compared_bases)
     judged_faults = sorted(
         (
             _judge_fault(compared_bases, fitted_variant, baseline_fit, sample_count)
@@ -147,7 +147,7 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], fault_fits: FaultFits)
         control_excess=max(control_excesses),
         clean_control_excess=control_excesses[0],
         by_force=isinstance(first_base.base, ForceBase),
-        step_s=first_base.row_s,
+        step_s=first_base.step_s,
         complete=fault_fits.complete,
     )
 

@@ -140,13 +140,13 @@ def _make_common_faults(channel: _Channels, parts: Sequence[Part], samples: Floa
     rates = [sign * delay * period_samples / longest_part.file_length for delay in CLOCK_DELAYS for sign in (1.0, -1.0)]
     clock_origins = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [
-        _make_skew(channel, rate, from_file_start, parts)
+        _make_clock_drift(channel, rate, from_file_start, parts)
         for rate in rates
         if abs(rate) < LARGEST_CLOCK_ERROR
         for from_file_start in clock_origins
     ]
     clocks += [
-        fix_size(_make_skew(channel, clock.rate, clock.from_file_start, parts), 1e6 * clock.step)
+        fix_size(_make_clock_drift(channel, clock.rate, clock.from_file_start, parts), 1e6 * clock.step)
         for clock in lags.clocks
     ]
     yield replace(channel.make_fault("clock_drift", clocks), varies=True)
@@ -260,9 +260,9 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _make_skew(channel: _Channels, rate_error: float, from_file_start: bool, parts: Sequence[Part]) -> Variant:
-    """Make clock skew: readings taken at t (1 + rate_error), resampled to t. from_file_start: whether t counts from
-    the beginning of the file, else of each part."""
+def _make_clock_drift(channel: _Channels, rate_error: float, from_file_start: bool, parts: Sequence[Part]) -> Variant:
+    """Make a drift of the clock: readings taken at t (1 + rate_error), resampled to t. from_file_start: whether t
+    counts from the beginning of the file, else of each part."""
 
     def compute_read_times(part: Part) -> FloatArray:
         offset = part.start if from_file_start else 0
@@ -273,7 +273,7 @@ def _make_skew(channel: _Channels, rate_error: float, from_file_start: bool, par
         undone = channel.make_undo(lambda y, rate: resample(y, times))(part)
         return replace(undone, known=part.known & (times >= 0) & (times <= len(times) - 1))
 
-    at_size = lambda size: _make_skew(channel, size * rate_error, from_file_start, parts)  # noqa: E731
+    at_size = lambda size: _make_clock_drift(channel, size * rate_error, from_file_start, parts)  # noqa: E731
     noise_factor = compute_noise_gain(np.concatenate([compute_read_times(part) for part in parts]))
     return Variant(
         (undo,), scale_parameter("ppm", 1e6 * rate_error), *SIZE_RANGE, noise_factor=noise_factor,

@@ -25,6 +25,10 @@ _SIGNAL_PATTERN = re.compile(rf"\b(?:(?:v|f|a|dv)?[{AXES}]|t)\b")
 """Pattern of a signal's name in a formula."""
 CONSTANT = "1"
 """Shape of a constant force."""
+POWER_BOUNDS = (0.15, 6.0)
+"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop."""
+STATIC_EXCESS_BOUNDS = (0.02, 20.0)
+"""Bounds of the excess of static over sliding friction, relative to the latter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +64,6 @@ def format_odd_power(signal_name: str, parameter_index: int) -> str:
 def format_even_power(signal_name: str, parameter_index: int) -> str:
     """Write the formula of an even power of a signal, abs(x)^p. parameter_index: index of the free exponent."""
     return f"abs({signal_name})**p{parameter_index}"
-
-
-POWER_BOUNDS = (0.15, 6.0)
-"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop."""
-STATIC_EXCESS_BOUNDS = (0.02, 20.0)
-"""Bounds of the excess of static over sliding friction, relative to the latter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,17 +223,17 @@ def _generate_pole_terms(axis: Axis) -> Iterator[Term]:
 def _generate_memory_terms(axis: Axis, duration_s: float, rate_hz: float) -> Iterator[Term]:
     """Generate terms with memory: first-order lags, drift of gains with a lagged square (heating), play, delays and the
     integral of the position."""
-    sample_period_s, longest_s = 1 / rate_hz, duration_s
+    sample_period_s = 1 / rate_hz
     for time_constant_s in np.geomspace(
         2 * sample_period_s, max(min(8.0, duration_s / 4), 4 * sample_period_s), 8
     ).tolist():
-        bounds = ((sample_period_s, longest_s),)
+        bounds = ((sample_period_s, duration_s),)
         for signal_name in (axis.x, axis.v, axis.f):
             yield Term(f"lag({signal_name}, p0)", (time_constant_s,), bounds)
     for time_constant_s in np.geomspace(0.1, max(duration_s / 3, 0.2), 5).tolist():
-        for signal_name, squared_signal in ((axis.f, axis.f), (axis.x, axis.x), (axis.v, axis.v)):
+        for signal_name in (axis.f, axis.x, axis.v):
             yield Term(
-                f"{signal_name}*lag({squared_signal}**2, p0)", (time_constant_s,), ((sample_period_s, 10 * longest_s),)
+                f"{signal_name}*lag({signal_name}**2, p0)", (time_constant_s,), ((sample_period_s, 10 * duration_s),)
             )
     for share in (0.03, 0.1, 0.2, 0.4, 0.7):
         yield Term(

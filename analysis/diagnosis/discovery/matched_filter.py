@@ -33,8 +33,8 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.band_limited import compute_low_pass_gain
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_SETTLING_S = 2.0  # chosen
-"""Length (s) of the zeros appended to a record, so that little of the response at its end wraps around to the start."""
+_SETTLING_S = 2.0
+"""Length (s) of the zeros appended to a record, against wrap-around of the response at its end. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,23 +71,18 @@ class FilteredRecord:
         return self._select_blocks(np.hstack([force_outputs, spectrum[:, : len(self.reading_units)]]))
 
     def filter_forces(self, forces: FloatArray) -> FloatArray:
-        """Compute (kept samples, k + p): outputs for the residuals that forces (n, m), N, cause together. A force acts
-        as in `compute_column`."""
-        step_mean = forces.copy()
-        step_mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
-        spectrum = rfft(step_mean, self.length, axis=0)[: len(self.force_response)]
+        """Compute (kept samples, k + p): outputs for the residuals that forces (n, m), N, cause together."""
+        spectrum = rfft(_average_over_steps(forces), self.length, axis=0)[: len(self.force_response)]
         return self._filter_spectrum(np.einsum("lcm,lm->lc", self.force_response, spectrum))
 
     def compute_column(self, signal: FloatArray, output: int) -> FloatArray:
         """Compute (kept samples,): output of one filter. signal: (n,), a force along its axis, N, or change of its
-        reading. Forces are means of two samples, because the model's commands are held over a step."""
+        reading."""
         lines, axes = self.strength.shape
         if output >= axes:
             spectrum = rfft(signal, self.length)[:lines] / self.reading_units[output - axes]
         else:
-            step_mean = signal.copy()
-            step_mean[:-1] = 0.5 * (signal[1:] + signal[:-1])
-            spectrum = rfft(step_mean, self.length)[:lines] * self.strength[:, output]
+            spectrum = rfft(_average_over_steps(signal), self.length)[:lines] * self.strength[:, output]
         return self._select_blocks(spectrum[:, None])[:, 0]
 
     def _select_blocks(self, spectrum: ComplexArray) -> FloatArray:
@@ -120,6 +115,11 @@ class View:
     """Edges of the blocks in the s samples, (blocks + 1)."""
     noise: float
     """Mean square of the noise in a filtered sample."""
+
+
+def _average_over_steps(forces: FloatArray) -> FloatArray:
+    """Average forces (n, ...) over each step, because the model's commands are held over a step."""
+    return np.concatenate([0.5 * (forces[1:] + forces[:-1]), forces[-1:]])
 
 
 def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:

@@ -11,7 +11,7 @@ from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.errors.standard_errors import compute_full_sensitivity, compute_standard_errors
-from analysis.diagnosis.limits import INTERVAL_FACTOR, LAW_ROUNDING_TOLERANCE
+from analysis.diagnosis.limits import INTERVAL_HALF_WIDTH, LAW_ROUNDING_TOLERANCE
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.search_context import FIRST_FIT_STEPS, SearchContext
 from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect
@@ -112,7 +112,7 @@ def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
         if role != "exponent" or value <= 0:
             continue
         rounded = max(round(2 * value) / 2, 0.5)
-        half_width = 1.96 * INTERVAL_FACTOR * float(errors[index]) * value
+        half_width = INTERVAL_HALF_WIDTH * float(errors[index]) * value
         if abs(value - rounded) <= max(half_width, LAW_ROUNDING_TOLERANCE * value):
             simplified = substitute_parameter(simplified, index, rounded)
     if simplified.numbers == law.numbers:
@@ -128,7 +128,7 @@ def is_full_soft_limit(law: Law, tolerance: float) -> bool:
 def _simplify_soft_limit(law: Law, error: float) -> Law:
     """Reduce a law to the soft limit alone where the interval of its factor p0 contains 1 and not 0. error: standard
     error of p0."""
-    half_width = 1.96 * INTERVAL_FACTOR * error
+    half_width = INTERVAL_HALF_WIDTH * error
     soft_limit = _SOFT_LIMIT_PATTERN.fullmatch(law.expression)
     if soft_limit is None or not half_width < 1 or not is_full_soft_limit(law, max(half_width, LAW_ROUNDING_TOLERANCE)):
         return law

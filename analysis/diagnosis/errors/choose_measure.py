@@ -166,8 +166,8 @@ def _exclude_transient(record: Observed, model: MechanicalModel) -> Observed:
 
 
 def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
-    """Estimate (c,): rms noise of each channel in the record in which it is least; `UNKNOWN_NOISE_SHARE` of the rms
-    signal where unknown or 0."""
+    """Estimate (c,): rms noise of each channel over all records, each with the noise of the record in which it is
+    least, or none where the channel is constant; `UNKNOWN_NOISE_SHARE` of the rms signal where unknown or 0."""
     channel_count = records[0].measured.shape[1]
     noise_by_record = [
         np.concatenate(
@@ -176,7 +176,9 @@ def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -
         for floor, record in zip(floors, records, strict=True)
     ]
     signal_rms = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
-    least_noise = np.fmin.reduce(noise_by_record)
+    is_varying = np.array([(record.measured != record.measured[0]).any(axis=0) for record in records])
+    varying_share = np.average(is_varying, axis=0, weights=[len(record.measured) for record in records])
+    least_noise = np.fmin.reduce(np.where(is_varying, noise_by_record, np.nan)) * np.sqrt(varying_share)
     return np.asarray(
         np.where(np.isfinite(least_noise) & (least_noise > 0), least_noise, UNKNOWN_NOISE_SHARE * signal_rms)
     )

@@ -32,8 +32,6 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
-UNSTATED_TOLERANCE = Tolerance(modes=UNSTATED_MODE_SHARE)
-"""Tolerance of a model that states none; that of entries at the axes follows from `_choose_deviation`."""
 DAMPING_UNCERTAINTY_RATIO = 10.0
 """Relative uncertainty of a mode's damping over that of its frequency. Chosen by hand: damping is identified far less
 accurately."""
@@ -98,9 +96,8 @@ def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuni
         for quantity in ("frequency", "mass", "damping")
         for k in mode_indices
     ]
-    tolerance = model.tolerance or UNSTATED_TOLERANCE
-    relative_deviation = UNSTATED_TOLERANCE.modes if tolerance.modes is None else tolerance.modes
-    assert relative_deviation is not None
+    tolerance = model.tolerance or Tolerance()
+    mode_deviation = UNSTATED_MODE_SHARE if tolerance.modes is None else tolerance.modes
     axis_deviations = [
         _choose_deviation(stated_deviation, matrix[:m, :m])
         for stated_deviation, matrix in (
@@ -111,7 +108,7 @@ def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuni
     ]
     deviation = np.concatenate(
         [np.full(len(axis_pairs), deviation) for deviation in axis_deviations]
-        + [np.full(len(mode_indices), relative_deviation * factor) for factor in (1.0, 1.0, DAMPING_UNCERTAINTY_RATIO)]
+        + [np.full(len(mode_indices), mode_deviation * factor) for factor in (1.0, 1.0, DAMPING_UNCERTAINTY_RATIO)]
     )
     units = [find_matrix_unit(part, model.system) for part in MATRIX_UNITS]
     return Tuning(

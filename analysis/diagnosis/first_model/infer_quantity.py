@@ -101,7 +101,7 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
     position_recordings = [replace(_set_quantity(recording, "position"), position=None) for recording in recordings]
     try:
         motions = compute_motions(observe_parts(position_recordings, channel_count))
-        regression = build_regression(motions, 0, (), turns=False)
+        regression = build_regression(motions, 0, (), turns_freely=False)
     except (NoMotionError, np.linalg.LinAlgError):
         return "position"
     all_columns = regression.select_columns(())

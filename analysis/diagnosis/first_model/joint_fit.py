@@ -62,10 +62,10 @@ class _Parametrisation:
     """Matrix, row and column of each parameter; the constant forces follow them."""
 
 
-def build_regressions(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
-    """Build the regression of the force of each axis on mass, damping, stiffness and a constant, without laws. turns:
-    whether a shaft turns freely and has no stiffness (`build_regression`)."""
-    return tuple(build_regression(motions, axis, (), turns) for axis in range(motions[0].force.shape[1]))
+def build_regressions(motions: Sequence[Motion], turns_freely: bool) -> tuple[Regression, ...]:
+    """Build the regression of the force of each axis on mass, damping, stiffness and a constant, without laws.
+    turns_freely: whether a shaft turns freely and has no stiffness (`build_regression`)."""
+    return tuple(build_regression(motions, axis, (), turns_freely) for axis in range(motions[0].force.shape[1]))
 
 
 def fit_jointly(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:

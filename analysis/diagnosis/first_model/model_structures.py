@@ -95,7 +95,7 @@ class BalancedRecordings:
     """Force balance of each axis, without laws."""
     untimed: bool
     """Whether the recordings have no time axis: then only a stiffness can be fitted."""
-    turns: bool
+    turns_freely: bool
     """Whether a shaft rotates freely, so that no spring can hold it."""
     rotational: bool
     """Whether the motion is an angle: in SI, inertia in kg m², stiffness in N m/rad."""
@@ -115,11 +115,9 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
         raise NoMotionError("not every command has exactly one measured motion")
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
-    turns = any(measure_scales(motions, axis, first.is_rotational).turns for axis in range(axis_count))
-    untimed = not np.isfinite(motions[0].band_hz)
-    return BalancedRecordings(
-        first, build_regressions(motions, turns), untimed, turns, first.is_rotational, is_free_motion(first)
-    )
+    turns_freely = any(measure_scales(motions, axis, first.is_rotational).turns_freely for axis in range(axis_count))
+    untimed, regressions = not np.isfinite(motions[0].band_hz), build_regressions(motions, turns_freely)
+    return BalancedRecordings(first, regressions, untimed, turns_freely, first.is_rotational, is_free_motion(first))
 
 
 def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
@@ -203,7 +201,7 @@ def _require_suitable(balanced: BalancedRecordings, kind: Kind) -> None:
         raise StructureFitError("it is fitted to spectra")
     if balanced.free and kind == "massless":
         raise StructureFitError("a body in free motion has a mass")
-    if balanced.turns and kind != "motor":
+    if balanced.turns_freely and kind != "motor":
         raise StructureFitError("the shaft makes whole turns, so no spring holds it: only motor can be fitted")
     if kind == "gravity" and not balanced.rotational:
         raise StructureFitError("along a line, weight is a constant force, not a spring: gravity is for pendulums")

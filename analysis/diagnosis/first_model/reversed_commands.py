@@ -64,7 +64,9 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
     """Whether negating the force lowers the error of an axis's balance (see the module's docstring)."""
     recorded_regression, negated_regression = (
-        build_regression([replace(motion, force=sign * motion.force) for motion in motions], axis, (), turns=False)
+        build_regression(
+            [replace(motion, force=sign * motion.force) for motion in motions], axis, (), turns_freely=False
+        )
         for sign in (1.0, -1.0)
     )
     recorded_structure, negated_structure = (

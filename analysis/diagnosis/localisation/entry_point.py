@@ -31,6 +31,8 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BLOCK_LINES = 8
 """Number of neighbouring (correlated) lines that count as one when two entries are compared. Chosen."""
+_FEWEST_BLOCKS = 3
+"""Fewest blocks of such lines for a test. Chosen."""
 _TINY = np.finfo(np.float64).tiny
 """Smallest positive normal number: lower limit of divisors."""
 
@@ -58,16 +60,12 @@ def compare_sensors(spectra: ResidualSpectra, derivative: int) -> SensorComparis
     if spectra.residual.shape[2] != 2 * response_count:
         return None
     derivative_power_gain = (2 * np.pi * spectra.frequency_hz) ** (2 * derivative)
-    response_power, position_power = (
-        np.abs(spectra.residual[:, :, :response_count]) ** 2,
-        np.abs(spectra.residual[:, :, response_count:]) ** 2,
-    )
-    position_noise = spectra.noise[:, :, response_count:]
-    motion_power = (
-        np.maximum(response_power - spectra.noise[:, :, :response_count], 0.0) / derivative_power_gain[:, None]
-    )
+    residual_power = np.abs(spectra.residual) ** 2
+    response_power, position_power = residual_power[:, :, :response_count], residual_power[:, :, response_count:]
+    response_noise, position_noise = spectra.noise[:, :, :response_count], spectra.noise[:, :, response_count:]
+    motion_power = np.maximum(response_power - response_noise, 0.0) / derivative_power_gain[:, None]
     is_informative = (motion_power > SENSOR_CHANGE_POWER_RATIO * position_noise) & (
-        response_power > SENSOR_LINE_POWER_RATIO * spectra.noise[:, :, :response_count]
+        response_power > SENSOR_LINE_POWER_RATIO * response_noise
     )
     if is_informative.sum() < SENSOR_LEAST_LINES:
         return SensorComparison("undecided", 0.0, 0.0)
@@ -222,10 +220,10 @@ def _test_against_best(
     log_power: FloatArray, best_log_power: FloatArray, is_above_noise: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
 ) -> float:
     """Compute the p-value of a one-sided paired t-test against the best entry, over blocks of neighbouring lines above
-    the noise; 1 for fewer than three blocks (chosen)."""
+    the noise; 1 for fewer than `_FEWEST_BLOCKS`."""
     difference = (log_power - best_log_power)[is_above_noise]
     block_count = len(difference) // _BLOCK_LINES
-    if block_count < 3:
+    if block_count < _FEWEST_BLOCKS:
         return 1.0
     block_means = difference[: block_count * _BLOCK_LINES].reshape(block_count, _BLOCK_LINES).mean(axis=1)
     standard_error = float(block_means.std(ddof=1)) / np.sqrt(block_count)

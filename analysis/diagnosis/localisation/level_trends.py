@@ -7,6 +7,7 @@ variation between periods; external noise does not depend on the level.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,11 @@ from analysis.diagnosis.limits import DISTORTION_P, STEADY_DB
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
+
+_LEAST_AMPLITUDE = 1e-300
+"""Lower limit of an amplitude, so that its logarithm is finite."""
+_WHOLE_BAND: Band = (0.0, np.inf)
+"""Band (Hz) that stands for the whole driven band in a `_Group`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,22 +60,33 @@ class LevelTrend:
         return "rises from nothing" if self.from_nothing else "rises"
 
 
+class _Group(NamedTuple):
+    """Distortions that differ in their level only; the fields are those of `LevelTrend`."""
+
+    output: str
+    quantity: str
+    input: str
+    band_hz: Band
+    whole_band: bool
+    kind: Kind
+
+
 def compute_level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
     """Compute the trend of each output, input, band and kind. cells: distortions at all levels."""
-    groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
+    cells_by_group: dict[_Group, list[Distortion]] = {}
     for cell in cells:
         # Realisations differ slightly in the band that they drive.
         band = _WHOLE_BAND if cell.whole_band else cell.band_hz
-        group_key = (cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
-        groups.setdefault(group_key, []).append(cell)
+        group = _Group(cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
+        cells_by_group.setdefault(group, []).append(cell)
     return tuple(
-        _compute_trend(group_key, sorted(group, key=lambda cell: cell.amplitude)) for group_key, group in groups.items()
+        _compute_trend(group, sorted(group_cells, key=lambda cell: cell.amplitude))
+        for group, group_cells in cells_by_group.items()
     )
 
 
-def _compute_trend(group_key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distortion]) -> LevelTrend:
-    """Compute the trend of one group. group_key: output, quantity, input, band, whether it is the whole band, kind;
-    cells: its distortions, by rising level."""
+def _compute_trend(group: _Group, cells: Sequence[Distortion]) -> LevelTrend:
+    """Compute the trend of one group. cells: its distortions, by rising level."""
     distortion_rms = np.array([max(cell.rms, cell.limit_rms) for cell in cells])
     signal_rms = np.array([cell.signal_rms for cell in cells])
     levels = np.array([cell.amplitude for cell in cells])
@@ -77,10 +94,10 @@ def _compute_trend(group_key: tuple[str, str, str, Band, bool, Kind], cells: Seq
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
     is_significant = np.array([cell.p_value < DISTORTION_P for cell in cells])
     slope = _estimate_slope(levels, relative_db, np.array([cell.lines for cell in cells]), is_significant)
-    if group_key[4]:
+    if group.whole_band:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
-        group_key = (*group_key[:3], band, *group_key[4:])
-    return LevelTrend(*group_key, p_value, slope, bool(is_significant.any() and not is_significant[0]))
+        group = group._replace(band_hz=band)
+    return LevelTrend(*group, p_value, slope, bool(is_significant.any() and not is_significant[0]))
 
 
 def _estimate_slope(
@@ -93,10 +110,8 @@ def _estimate_slope(
     if not is_significant.any() or not (levels > 0).all() or len(set(levels)) < 2:
         return None
     bounded_slope = _regress_slope(np.log2(levels), relative_db, line_counts)
-    is_rising, is_falling = (
-        bounded_slope > STEADY_DB and not is_significant[0],
-        bounded_slope < -STEADY_DB and not is_significant[-1],
-    )
+    is_rising = bounded_slope > STEADY_DB and not is_significant[0]
+    is_falling = bounded_slope < -STEADY_DB and not is_significant[-1]
     if is_significant.all() or is_rising or is_falling:
         return bounded_slope
     return (
@@ -113,9 +128,3 @@ def _regress_slope(doublings: FloatArray, relative_db: FloatArray, line_counts: 
     return float(np.sum(line_counts * centred_doublings * relative_db)) / float(
         np.sum(line_counts * centred_doublings**2)
     )
-
-
-_LEAST_AMPLITUDE = 1e-300
-"""Lower limit of an amplitude, so that its logarithm is finite."""
-_WHOLE_BAND: Band = (0.0, np.inf)
-"""Band (Hz) that stands for the whole driven band in a group's key."""

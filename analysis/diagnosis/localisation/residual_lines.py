@@ -229,7 +229,10 @@ def _sum_lines(
         axis=1,
     )
     floored_signal = np.maximum(signal, _LEAST_AMPLITUDE_SHARE**2 * strongest_signal)
-    positive_noise = np.maximum(noise, np.finfo(np.float64).tiny)
+    numbers = np.finfo(np.float64)
+    # A channel that is constant in the segment shows no noise at all, but no number is more exact than its rounding.
+    least_noise = numbers.eps**2 * np.maximum(residual, floored_signal)
+    positive_noise = np.maximum(np.maximum(noise, least_noise), numbers.tiny)
     line_count = segment_properties[4]
     return ResidualLines(
         *segment_properties,

@@ -24,6 +24,8 @@ _BIN_COUNT = 12
 """Number of bins of a state, with equally many samples each as far as equal values allow. Chosen."""
 PERMUTATIONS = 60
 """Number of permutations of blocks. Chosen: p-values below about ten over it are those of a fitted tail."""
+_LEAST_SAMPLES_PER_BIN = 10
+"""Least number of samples per bin, on average, for a test. Chosen."""
 _LEAST_CONCENTRATION = 1.5
 """Least ratio of a bin's mean square to the expected one, for the bin to belong to a region. Chosen."""
 _LEAST_SHARE = 0.05
@@ -32,6 +34,8 @@ _SMALLEST_NORMAL = np.finfo(np.float64).tiny
 """Smallest normal number, against divisions by zero."""
 _LEAST_EXPECTED = 1e-9
 """Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested. Chosen."""
+_LEAST_OPPOSITE_SHARE = 1 / 3
+"""Least ratio of the smaller to the larger of two opposite half means, for a dependence by the sign. Chosen."""
 MIDDLE_REGION_PHRASE = "at middling"
 """First words of the text for a region with neither small nor large magnitudes of velocity, command or response."""
 _DISPLAY_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
@@ -85,9 +89,9 @@ def find_state_regions(
     disturbance: Disturbance, states: Sequence[State], seed: int, permutations: int = PERMUTATIONS
 ) -> tuple[StateRegion, ...]:
     """Find regions with a concentration of at least `_LEAST_CONCENTRATION`, or with bin means that explain
-    `_LEAST_SHARE` of the power, ordered by p-value, then by falling share. Empty with fewer than ten samples per bin
-    (chosen), or for a disturbance of zeros. p-values are of single tests, by block permutation within segments, and not
-    compared with a limit here; they depend on the seed.
+    `_LEAST_SHARE` of the power, ordered by p-value, then by falling share. Empty with fewer than
+    `_LEAST_SAMPLES_PER_BIN`, or for a disturbance of zeros. p-values are of single tests, by block permutation within
+    segments, and not compared with a limit here; they depend on the seed.
 
     The size is tested for every state (over the magnitude of velocity, command and response), the sign for position and
     velocity only. Time is tested only with `Disturbance.signal`.
@@ -98,7 +102,7 @@ def find_state_regions(
         if state.values.shape != disturbance.values.shape:
             raise ValueError(f"{state.symbol} has shape {state.values.shape}, not {disturbance.values.shape}")
     is_used = (disturbance.strata >= 0) & np.isfinite(disturbance.values)
-    if is_used.sum() < 10 * _BIN_COUNT or not disturbance.values[is_used].any():
+    if is_used.sum() < _LEAST_SAMPLES_PER_BIN * _BIN_COUNT or not disturbance.values[is_used].any():
         return ()
     used_indices = np.flatnonzero(is_used)[np.argsort(disturbance.strata[is_used], kind="stable")]
     values, strata = disturbance.values[used_indices], disturbance.strata[used_indices]
@@ -274,14 +278,14 @@ def describe_region(
 
 def describe_dependence(symbol: str, means: FloatArray) -> str:
     """Describe the trend of the bin means: by the sign of the state where the means of the lower and the upper half
-    have opposite signs and the smaller is more than a third (chosen) of the larger, else depending on it. means: over
-    bins of equal count, in the order of the state."""
+    have opposite signs and similar magnitudes (`_LEAST_OPPOSITE_SHARE`), else depending on it. means: over bins of
+    equal count, in the order of the state."""
     lower_mean, upper_mean = means[: len(means) // 2].mean(), means[len(means) // 2 :].mean()
     largest_magnitude = max(abs(lower_mean), abs(upper_mean))
     if (
         largest_magnitude > 0
         and lower_mean * upper_mean < 0
-        and min(abs(lower_mean), abs(upper_mean)) > largest_magnitude / 3
+        and min(abs(lower_mean), abs(upper_mean)) > _LEAST_OPPOSITE_SHARE * largest_magnitude
     ):
         return f"by the sign of {symbol}"
     return f"depending on {symbol}"

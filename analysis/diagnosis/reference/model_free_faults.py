@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.data.measured_motion import READING_TOLERANCE, is_unusual_count
+from analysis.diagnosis.data.readings_at_limit import READING_TOLERANCE, is_unusual_count
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, make_claim_hypothesis
 from analysis.diagnosis.limits import STEP_FACTOR
 from analysis.diagnosis.types import Mask
@@ -29,6 +29,8 @@ FULL_STEP_SHARE = 0.75
 """Limit of the median step after a repeat, relative to the median of the other steps (`_has_full_steps`)."""
 REFERENCE_STRETCH_COUNT = 3
 """Number of stretches into which each reference recording is divided: the largest share of any stretch is usual."""
+ChannelFault = tuple[tuple[int, ...], Values]
+"""Channels, and the parameters of their fault."""
 
 
 def find_sensor_faults(
@@ -55,10 +57,6 @@ def find_sensor_faults(
         if fault is not None:
             return (_make_hypothesis(effects_by_name[name], *fault),) if name in effects_by_name else ()
     return ()
-
-
-ChannelFault = tuple[tuple[int, ...], Values]
-"""Channels, and the parameters of their fault."""
 
 
 def _make_hypothesis(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypothesis:
@@ -190,6 +188,5 @@ def _choose_channels(
     if not parameters:
         return None
     worst_channel = max(parameters, key=lambda channel: parameters[channel])
-    return tuple(range(channel_count)) if in_all_channels else (worst_channel,), {
-        parameter_name: parameters[worst_channel]
-    }
+    channels = tuple(range(channel_count)) if in_all_channels else (worst_channel,)
+    return channels, {parameter_name: parameters[worst_channel]}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from analysis.diagnosis.confirm.require_gain import CONSTANT_EFFECTS
 from analysis.diagnosis.document import Candidate, Diagnosis, FoundLaw, NamedEffect, Rival, make_found_law
 from analysis.diagnosis.effect_words import get_noun, get_place
-from analysis.diagnosis.limits import FURTHER_LAW_GAIN, LAW_CEILING_SHARE
+from analysis.diagnosis.limits import FURTHER_LAW_GAIN, LAW_REDUCTION_SHARE
 from analysis.diagnosis.result.candidate_wording import REFINEMENT_REASON
 from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.wording import conjoin
@@ -71,7 +71,7 @@ def add_balances_with_given_model(
     balance_candidates = [
         _make_candidate(replace(law, objection=LINEAR_DYNAMICS) if law.law.is_linear else law, axis, channels)
         for axis, law in sorted(judged_laws, key=lambda entry: (_rank_law(entry[1]), -entry[1].gain))
-        if law.share >= LAW_CEILING_SHARE and law.gain >= FURTHER_LAW_GAIN
+        if law.share >= LAW_REDUCTION_SHARE and law.gain >= FURTHER_LAW_GAIN
     ]
     ranked = sorted((*unconfirmed, *balance_candidates), key=lambda candidate: -candidate.held_out_gain)
     unnamed = [candidate for candidate in ranked if (candidate.effect, candidate.axis) not in named_keys]
@@ -161,10 +161,10 @@ def _list_covered_names(effect: NamedEffect) -> tuple[str, ...]:
 
 def _rank_law(judged_law: "JudgedLaw") -> int:
     """Rank a candidate, 0 first. 0: physically possible parameters and a significant gain; 1: other laws; 2: linear
-    laws; 3: laws that explain almost nothing (`LAW_CEILING_SHARE`)."""
+    laws; 3: laws that explain almost nothing (`LAW_REDUCTION_SHARE`)."""
     if judged_law.law.is_linear:
         return 2
-    if judged_law.share < LAW_CEILING_SHARE:
+    if judged_law.share < LAW_REDUCTION_SHARE:
         return 3
     return 0 if judged_law.is_physical and (judged_law.gain_low > 0 or judged_law.confirmed_by_folds) else 1
 
@@ -202,11 +202,12 @@ def collect_balance_errors(
         letter = shorten_axis_name(channels[axis], channels)
         named_effects = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
         law_indices = [law.law_index for law in balance.laws if law.simulated_as in named_effects]
-        named_error = balance.compute_error(law_indices) if law_indices else balance.linear
+        linear_error, all_laws_error = balance.linear_error, balance.all_laws_error
+        named_error = balance.compute_error(law_indices) if law_indices else linear_error
         has_prior = balance.search.regression.prior is not None
         errors.append(
             BalanceErrors(
-                letter, balance.linear, named_error, balance.ceiling, bool(law_indices), balance.tested, has_prior
+                letter, linear_error, named_error, all_laws_error, bool(law_indices), balance.tested, has_prior
             )
         )
     return tuple(errors)
@@ -226,7 +227,7 @@ def _compute_explained_share(balance: "Balance", law: "JudgedLaw") -> float:
     """Compute the share of the linear model's held-out error power that a law removes, 0 to 1. `JudgedLaw.share` is
     relative to the decrease by all laws together, and is converted; that of a law of the command is already relative to
     the linear model's error."""
-    total_share = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
+    total_share = 1 - (balance.all_laws_error / max(balance.linear_error, 1e-300)) ** 2 if law.has_column else 1.0
     return min(max(total_share * law.share, 0.0), 1.0)
 
 

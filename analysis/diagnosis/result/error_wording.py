@@ -1,8 +1,7 @@
 """Sentences for the user about held-out errors: compared with the noise, with all laws together, and with a black box.
 
-The ceiling is the fit of all laws together in a force balance: a sum of a few laws can hardly have a smaller error
-(`BalanceErrors.ceiling`). Errors are rms errors over the rms of the signal, in a force balance over the rms of the
-force.
+Errors are rms errors over the rms of the signal, in a force balance over the rms of the force. There, a sum of a few
+laws can hardly have a smaller error than all candidate laws together.
 """
 
 from collections.abc import Sequence
@@ -16,6 +15,9 @@ from analysis.wording import capitalise
 ROUNDING_TOLERANCE = 1e-9
 """Relative difference up to which two errors of the same data count as equal: above the rounding of 64-bit floats.
 Chosen."""
+_NOISE_SOURCES = {"rest": "at the level measured at rest", "quiet band": "at the level measured above the driven band"}
+"""Words for noise that was not estimated from repeats, by `NoiseFloor.method`. Its level during excitation is then
+unknown, so that errors are not stated in units of it."""
 
 
 def describe_black_box(black_box: BlackBox | None, is_effect_named: bool) -> str:
@@ -47,12 +49,12 @@ def is_black_box_better(black_box: BlackBox) -> bool:
     return black_box.test_error * EQUAL_ERROR_RATIO < black_box.physics_error
 
 
-def describe_ceiling(axis_errors: Sequence[BalanceErrors]) -> tuple[str, ...]:
+def describe_balance_errors(axis_errors: Sequence[BalanceErrors]) -> tuple[str, ...]:
     """Describe the held-out errors of each axis's force balance, a text per axis, also where no law could be tested."""
-    return tuple(_describe_ceiling_of_axis(errors, len(axis_errors) == 1) for errors in axis_errors)
+    return tuple(_describe_axis_errors(errors, len(axis_errors) == 1) for errors in axis_errors)
 
 
-def _describe_ceiling_of_axis(errors: BalanceErrors, is_single_axis: bool) -> str:
+def _describe_axis_errors(errors: BalanceErrors, is_single_axis: bool) -> str:
     """Describe the held-out errors of one axis. is_single_axis: whether the device has one axis, which is then not
     named."""
     axis_text = "" if is_single_axis else f" along {errors.axis}"
@@ -67,27 +69,23 @@ def _describe_ceiling_of_axis(errors: BalanceErrors, is_single_axis: bool) -> st
         else "the error of mass, damping and stiffness alone is"
     )
     linear_text = (
-        f"In the force balance{axis_text}, on held-out data, {model_text} {format_error(errors.linear)} of the force"
+        f"In the force balance{axis_text}, on held-out data, {model_text} {format_error(errors.linear_error)} of the "
+        "force"
     )
     named_text = (
         f"with the named laws it is {format_error(errors.named_error)}" if errors.has_named_law else "no law is named"
     )
-    if errors.has_named_law and errors.named_error <= errors.ceiling * (1 + ROUNDING_TOLERANCE):
+    if errors.has_named_law and errors.named_error <= errors.all_laws_error * (1 + ROUNDING_TOLERANCE):
         return f"{linear_text}, {named_text}, and all laws together reach no smaller error."
     share_text = (
         f", and that is {format_share(errors.share)} of the reduction of the error power that all laws together reach"
-        if errors.named_error < errors.linear
+        if errors.named_error < errors.linear_error
         else ""
     )
     return (
-        f"{linear_text}; with all laws together it is {format_error(errors.ceiling)}, a bound that a sum of a few laws "
-        f"can hardly reach; {named_text}{share_text}."
+        f"{linear_text}; with all laws together it is {format_error(errors.all_laws_error)}, a bound that a sum of a "
+        f"few laws can hardly reach; {named_text}{share_text}."
     )
-
-
-_NOISE_SOURCES = {"rest": "at the level measured at rest", "quiet band": "at the level measured above the driven band"}
-"""Words for noise that was not estimated from repeats, by `NoiseFloor.method`. Its level during excitation is then
-unknown, so that errors are not stated in units of it."""
 
 
 def format_ratio(ratio: float) -> str:
@@ -137,15 +135,10 @@ def describe_confirmation(fit_errors: Errors, test_errors: Errors) -> str:
     """State that held-out data do not confirm the fit, or only in part (`CONFIRMED_FIT_RATIO`); empty where they
     confirm it or an error is None. Errors of both sets are compared in units of their noise, which must not be 0,
     because their signals may differ."""
-    if None in (test_errors.after, test_errors.retuned, test_errors.noise, fit_errors.after, fit_errors.noise):
+    if test_errors.after is None or test_errors.retuned is None or fit_errors.after is None:
         return ""
-    assert (
-        test_errors.after is not None
-        and test_errors.retuned is not None
-        and test_errors.noise
-        and fit_errors.after is not None
-        and fit_errors.noise
-    )
+    if test_errors.noise is None or fit_errors.noise is None:
+        return ""
     if test_errors.after > test_errors.retuned:
         return (
             "The held-out data do not confirm this: there the re-tuned model alone has a smaller error "

@@ -95,26 +95,26 @@ class BalanceErrors:
 
     axis: str
     """Letter of the axis."""
-    linear: float
+    linear_error: float
     """With mass, damping and stiffness alone."""
     named_error: float
     """With the named laws in addition."""
-    ceiling: float
+    all_laws_error: float
     """With all candidate laws together: a bound that a few laws can hardly reach."""
     has_named_law: bool
     """Whether a law is named on this axis."""
     tested: bool = True
     """Whether the held-out samples contain enough motion to test laws."""
     is_model_given: bool = False
-    """Whether the model was given: `linear` is then the error of the re-tuned model."""
+    """Whether the model was given: `linear_error` is then the error of the re-tuned model."""
 
     @property
     def share(self) -> float:
         """Reduction of the error power by the named laws over the reduction by all laws together, 0 to 1; 0 where all
         laws together reduce nothing."""
-        possible_reduction = self.linear**2 - self.ceiling**2
+        possible_reduction = self.linear_error**2 - self.all_laws_error**2
         return (
-            min(max((self.linear**2 - self.named_error**2) / possible_reduction, 0.0), 1.0)
+            min(max((self.linear_error**2 - self.named_error**2) / possible_reduction, 0.0), 1.0)
             if possible_reduction > 0
             else 0.0
         )

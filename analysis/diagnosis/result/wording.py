@@ -19,8 +19,8 @@ from analysis.diagnosis.result.candidate_wording import (
     format_class_noun,
 )
 from analysis.diagnosis.result.error_wording import (
+    describe_balance_errors,
     describe_black_box,
-    describe_ceiling,
     describe_confirmation,
     describe_error,
     describe_error_change,
@@ -44,6 +44,13 @@ from equalizer.effects.effect import PlacedEffect
 
 _MAX_LISTED_PLACES = 3
 """Largest number of rows of a remaining mismatch that a sentence lists. Chosen."""
+_DISAGREEMENT = "Model and device disagree, and no effect of the catalogue explains it."
+_DISAGREEMENT_OR_NOISE = (
+    "Model and recording differ, and no effect of the catalogue explains it; only repeated periods of the excitation "
+    "could show how much of the difference is noise."
+)
+"""Answers of the verdict `unexplained`: where noise was measured from repeats (or is not stated), and where it was
+estimated otherwise or is not known."""
 _AT_NOISE_LEVEL = (
     "The residual is no larger than the estimated noise; only repeated periods of the excitation could show that "
     "nothing else is missing."
@@ -100,10 +107,9 @@ def describe_verdict(
             remark = "" if diagnosis.verdict == "explained" else f" {_AT_NOISE_LEVEL}"
             return f"Missing in the model: {effect_titles}. {error_text}.{remark}"
         return f"Missing in the model: {effect_titles}, but that is not all. {error_text}, and a mismatch remains."
-    sentence = (
-        "Model and device disagree, and no effect of the catalogue explains it. "
-        f"{capitalise(describe_error(*choose_better_error(errors), errors, noise_method))}."
-    )
+    # Noise that does not repeat was not measured in the driven band, where coloured noise may be larger.
+    disagreement = _DISAGREEMENT if noise_method in ("", "repeats") else _DISAGREEMENT_OR_NOISE
+    sentence = f"{disagreement} {capitalise(describe_error(*choose_better_error(errors), errors, noise_method))}."
     return " ".join(filter(None, (sentence, describe_best_candidate(diagnosis, device))))
 
 
@@ -249,7 +255,7 @@ def write_summary_lines(findings: Findings) -> tuple[str, ...]:
             describe_raised_error(diagnosis.fit.test),
             describe_retuning(moved_parameters, findings.fitted),
             describe_remainder(diagnosis, device),
-            *describe_ceiling(findings.balance_errors),
+            *describe_balance_errors(findings.balance_errors),
             describe_black_box(findings.black_box, bool(diagnosis.effects)),
             *describe_candidates(diagnosis, device),
         ]

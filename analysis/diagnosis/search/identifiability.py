@@ -24,6 +24,7 @@ from analysis.diagnosis.errors.standard_errors import (
 )
 from analysis.diagnosis.limits import (
     INTERVAL_FACTOR,
+    INTERVAL_HALF_WIDTH,
     MOST_BETWEEN_SEGMENTS,
     REPLACEMENTS_TRIED,
     UNDETERMINED_REACH,
@@ -255,11 +256,11 @@ def _is_undetermined(parameter: FreeParameter, coordinate: float, error: float) 
 
 
 def _compute_interval_and_distance(parameter: FreeParameter, coordinate: float, error: float) -> tuple[float, float]:
-    """Compute the half width of the parameter's 95 % interval (1.96 standard errors, times `INTERVAL_FACTOR`; infinite
-    for an infinite error), and the distance of its value from its null value."""
+    """Compute the half width of the parameter's 95 % interval (`INTERVAL_HALF_WIDTH`; infinite for an infinite error),
+    and the distance of its value from its null value."""
     value, null_value = parameter.to_value(coordinate), parameter.parameter.none or 0.0
     width = abs(parameter.to_value(coordinate + error) - value) if np.isfinite(error) else np.inf  # no limit of values
-    return 1.96 * INTERVAL_FACTOR * width, abs(value - null_value)
+    return INTERVAL_HALF_WIDTH * width, abs(value - null_value)
 
 
 def compute_null_distance(
@@ -282,7 +283,7 @@ def compute_null_distance(
         [float(fit_without.deviations @ fit_without.deviations - fit_with.deviations @ fit_with.deviations)],
     ])  # fmt: skip
     total_deviation = float(np.std(deviances, ddof=1) * np.sqrt(len(deviances)))
-    return 2 * float(deviances.sum()) / max(total_deviation, 1e-300) / (1.96 * INTERVAL_FACTOR)
+    return 2 * float(deviances.sum()) / max(total_deviation, 1e-300) / INTERVAL_HALF_WIDTH
 
 
 def _sum_stretch_squares(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:

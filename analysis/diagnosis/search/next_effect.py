@@ -1,19 +1,32 @@
 """Find the effect of the catalogue that lowers the error most when added to the selected ones (forward selection).
 
 Candidates are screened by linearisation, fitted by output error and compared: steps 2 to 5 of the theory of operation
-in `explain`.
+in `explain`. First fits of periodic recordings are made on short ones (`short_recordings`), then continued on all
+samples. Effects that depend on time cannot be compared there and are fitted on all samples; where the base contains
+motion-dependent forces, simulations are slow, and both kinds share the time by their gains.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
+import numpy as np
+
+from analysis.diagnosis.errors.hypothesis import Hypothesis, has_motion_forces
+from analysis.diagnosis.errors.output_error import (
+    Fitted,
+    Sensitivity,
+    build_jacobian,
+    evaluate_fit,
+    fit,
+    gather_evidence,
+)
+from analysis.diagnosis.limits import FITTING_GAIN_SHARE, LEAST_FITTED
 from analysis.diagnosis.search.compare_candidates import compare_candidates
 from analysis.diagnosis.search.no_prediction import has_unpredicted_channel
 from analysis.diagnosis.search.parsimony import are_exclusive, move_preferred_first
-from analysis.diagnosis.search.screening import screen
+from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
 from analysis.diagnosis.search.search_context import (
+    FITTING,
     SCREENING,
     STARTING,
     FittedCandidate,
@@ -21,7 +34,7 @@ from analysis.diagnosis.search.search_context import (
     compute_sensitivity,
     fit_first,
 )
-from analysis.diagnosis.search.short_recordings import fit_on_short_recordings, shorten_recordings
+from analysis.diagnosis.search.short_recordings import ShortRecordings, coarsen_steps, shorten_recordings
 from analysis.diagnosis.search.starting_hypotheses import (
     CLOCK_DRIFT,
     is_newest_within_data,
@@ -89,7 +102,7 @@ def find_first_fits(
     )
     time_varying_hypotheses = suggest_at_sites([effect for effect in observable_effects if effect.of_time], evidence)
     step.report(0.2)
-    return fit_on_short_recordings(context, short_form, base, time_invariant_hypotheses, time_varying_hypotheses)
+    return _fit_on_short_recordings(context, short_form, base, time_invariant_hypotheses, time_varying_hypotheses)
 
 
 def compare_plausible_fits(
@@ -122,3 +135,74 @@ def _suggest_hypotheses(
     ):
         hypotheses += context.guard.run(CLOCK_DRIFT, STARTING, lambda: search_clock_drift(catalogue, evidence), ())
     return hypotheses
+
+
+def _fit_on_short_recordings(
+    context: SearchContext,
+    short_form: ShortRecordings,
+    base: Fitted,
+    invariant: Sequence[Hypothesis],
+    varying: Sequence[Hypothesis],
+) -> list[Fitted]:
+    """Fit hypotheses on short recordings, then by at most one step on all samples; returns the finite fits, the best
+    first. invariant, varying: without and with dependence on time. The latter are fitted only where the predicted gain
+    is not far below the former's (`_keep_promising`). If `base` contains motion-dependent forces, gains far below the
+    best of all are not fitted (`fit_first`), or not continued on all samples (`_select_worth_continuing`), either."""
+    short = replace(short_form.context, measure=coarsen_steps(short_form.context.measure))
+    coarse = replace(context, measure=coarsen_steps(context.measure))
+    screening = context.guard.wrap(context.map_, SCREENING)
+    short_base, coarse_base = (
+        evaluate_fit(each.measure, context.tuning, base.deviations, base.hypothesis) for each in (short, coarse)
+    )
+    jacobian = compute_sensitivity(short, base.deviations, base.hypothesis, with_forces=True)
+    screened = screen(short.measure, context.tuning, short_base, jacobian, invariant, screening)
+    full_jacobian, has_forces = short_form.repeat_sensitivity(jacobian), has_motion_forces(base.hypothesis)
+    if has_forces:
+        full_jacobian = build_jacobian(context.measure, context.tuning, base.deviations, base.hypothesis, context.map_)
+    varying_screened = screen(coarse.measure, context.tuning, coarse_base, full_jacobian, varying, screening)
+    rival_gain = max((1 - trial.cost / coarse_base.cost for trial in varying_screened), default=0.0)
+    short_fits = fit_first(short, short_base, jacobian, screened, rival_gain * short_base.cost if has_forces else 0.0)
+    promising = _keep_promising((short_base, short_fits), coarse_base, varying_screened)
+    coarse_fits = fit_first(coarse, coarse_base, full_jacobian, promising)
+    if not has_forces:
+        return _evaluate_on_all(context, [*short_fits, *coarse_fits], None)
+    return _evaluate_on_all(
+        context, _select_worth_continuing((short_base, short_fits), (coarse_base, coarse_fits)), full_jacobian
+    )
+
+
+def _evaluate_on_all(context: SearchContext, fits: Sequence[Fitted], jacobian: Sensitivity | None) -> list[Fitted]:
+    """Evaluate fits on all samples, or continue them there by one step with the sensitivity `jacobian`; returns the
+    finite ones, the best first."""
+
+    def fit_to_all(fitted: Fitted) -> Fitted:
+        full_fit = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+        # One Gauss-Newton step on all samples fits the slow drift under friction, which one period does not contain.
+        return full_fit if jacobian is None else fit(context.measure, context.tuning, full_fit, jacobian, 1)
+
+    full_fits: list[Fitted] = list(context.guard.wrap(context.map_, FITTING)(fit_to_all, fits))  # type: ignore[arg-type]
+    # Hypotheses whose parameters the short recordings do not determine may diverge on all samples: left out.
+    return sorted((trial for trial in full_fits if np.isfinite(trial.cost)), key=lambda trial: trial.cost)
+
+
+def _select_worth_continuing(*groups: tuple[Fitted, Sequence[Fitted]]) -> list[Fitted]:
+    """Select, by falling gain, the fits with at least `FITTING_GAIN_SHARE` of the best gain, or `LEAST_FITTED` of them;
+    a gain is the relative reduction of the cost. groups: per set of samples, the base fit and the fits."""
+    ranked = sorted(
+        ((1 - trial.cost / base.cost, trial) for base, fits in groups for trial in fits), key=lambda entry: -entry[0]
+    )
+    return [
+        trial
+        for rank, (gain, trial) in enumerate(ranked)
+        if rank < LEAST_FITTED or gain >= FITTING_GAIN_SHARE * ranked[0][0]
+    ]
+
+
+def _keep_promising(
+    reference: tuple[Fitted, Sequence[Fitted]], coarse_base: Fitted, screened: Sequence[ScreenedHypothesis]
+) -> list[ScreenedHypothesis]:
+    """Keep hypotheses whose predicted relative reduction of the cost is at least `FITTING_GAIN_SHARE` times the largest
+    of the reference; relative, because its costs refer to other samples and steps. reference: base fit, and fits."""
+    base, fits = reference
+    best = max((1 - trial.cost / base.cost for trial in fits), default=0.0)
+    return [trial for trial in screened if 1 - trial.cost / coarse_base.cost >= max(FITTING_GAIN_SHARE * best, 0.0)]

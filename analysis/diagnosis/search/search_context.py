@@ -183,11 +183,15 @@ def has_held_out_mismatch(errors: FloatArray, candidate: FittedCandidate) -> boo
 
 
 def fit_first(
-    context: SearchContext, base: Fitted, jacobian: Sensitivity, screened: Sequence[ScreenedHypothesis]
+    context: SearchContext,
+    base: Fitted,
+    jacobian: Sensitivity,
+    screened: Sequence[ScreenedHypothesis],
+    rival_gain: float = 0.0,
 ) -> list[Fitted]:
     """Fit the hypotheses with the largest predicted gains, at most `FIRST_FIT_STEPS` steps each; the smallest cost
     first. Hypotheses whose fit crashes are omitted. base: the fit without the further effect; jacobian: its
-    sensitivity."""
+    sensitivity. rival_gain: largest predicted reduction of the cost by hypotheses that are fitted elsewhere."""
     measure, tuning = context.measure, context.tuning
 
     def make_first_fit(candidate: ScreenedHypothesis) -> Fitted:
@@ -200,7 +204,7 @@ def fit_first(
         )
 
     guarded_map = context.guard.wrap(context.map_, FITTING)
-    fits: list[Fitted] = list(guarded_map(make_first_fit, _select_worth_fitting(base, screened)))  # type: ignore[arg-type]
+    fits: list[Fitted] = list(guarded_map(make_first_fit, _select_worth_fitting(base, screened, rival_gain)))  # type: ignore[arg-type]
     return sorted(fits, key=lambda fitted: fitted.cost)
 
 
@@ -223,11 +227,13 @@ def compute_sensitivity(
     )
 
 
-def _select_worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
-    """Select the hypotheses with at least `FITTING_GAIN_SHARE` of the largest predicted gain; from `LEAST_FITTED`
-    (fewer if there are fewer) to `MOST_FITTED` of them."""
+def _select_worth_fitting(
+    base: Fitted, screened: Sequence[ScreenedHypothesis], rival_gain: float
+) -> list[ScreenedHypothesis]:
+    """Select the hypotheses with at least `FITTING_GAIN_SHARE` of the largest predicted gain, that of rivals included;
+    from `LEAST_FITTED` (fewer if there are fewer) to `MOST_FITTED` of them. rival_gain: as for `fit_first`."""
     ordered = _interleave_starts(screened)
-    best_gain = max((base.cost - candidate.cost for candidate in ordered), default=0.0)
+    best_gain = max([rival_gain, *(base.cost - candidate.cost for candidate in ordered)])
     promising = [candidate for candidate in ordered if base.cost - candidate.cost >= FITTING_GAIN_SHARE * best_gain]
     return (promising if len(promising) >= LEAST_FITTED else ordered[:LEAST_FITTED])[:MOST_FITTED]
 

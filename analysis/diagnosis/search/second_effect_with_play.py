@@ -19,6 +19,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance_variation
 from analysis.diagnosis.limits import IMPACTS_SHARE
 from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.parsimony import list_relatives
 from analysis.diagnosis.search.search_context import FITTING, SCREENING, STARTING, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import list_candidates
 from analysis.diagnosis.types import TimeBudget
@@ -69,9 +70,7 @@ def search_second_effects(
         return SecondEffects((), complete=True)
     if not time_left():
         return SecondEffects((), complete=False)
-    suggested_hypotheses = _suggest_second_effects(context, explanation, play_fit, catalogue)
-    guarded_problem = replace(weighted_problem, map_=context.guard.wrap(weighted_problem.map_, SCREENING))
-    starts, has_all_starts = _evaluate_starts(guarded_problem, play_fit, suggested_hypotheses, time_left)
+    starts, has_all_starts = _find_starts(context, explanation, (weighted_problem, play_fit), catalogue, time_left)
     best_starts = _select_best_per_effect([start for start in starts if start.cost < play_cost])[:MAX_FIRST_FITS]
     first_fits, has_all_fits = _fit_starts(context, weighted_problem, best_starts, time_left)
     refined_fits, has_all_refined = _refine_fits(
@@ -83,24 +82,47 @@ def search_second_effects(
     )
 
 
-def _suggest_second_effects(
-    context: SearchContext, explanation: Explanation, play_fit: BandPowerFit, catalogue: Sequence[Effect]
-) -> list[Hypothesis]:
-    """List hypotheses of a second effect: each effect of the catalogue other than play and a loose joint, with starting
-    values from the residuals of play, and the candidates of the first round of the search by waveforms, as fitted
-    there. Effects that contain an excluded effect (`SearchContext.excluded`) as a special case are left out, because
-    they would replace it."""
-    waveform_fit = evaluate_fit(context.measure, context.tuning, play_fit.deviations, play_fit.hypothesis)
-    evidence = gather_evidence(context.measure, context.tuning, waveform_fit)[0]
-    allowed_effects = [
+def _find_starts(
+    context: SearchContext,
+    explanation: Explanation,
+    play: tuple[BandPowerProblem, BandPowerFit],
+    catalogue: Sequence[Effect],
+    time_left: TimeBudget,
+) -> tuple[list[BandPowerFit], bool]:
+    """Evaluate hypotheses of a second effect: the candidates of the first round of the search by waveforms, as fitted
+    there, then each effect of the catalogue other than play and a loose joint. If one of the former leaves
+    `SUFFICIENT_COST`, waveform and band powers both show it: only its relatives and special cases are then compared
+    with it. Effects that contain an excluded effect (`SearchContext.excluded`) as a special case are left out, because
+    they would replace it. Returns also whether the time sufficed. play: the weighted problem, and the fit of play."""
+    weighted_problem, play_fit = play
+    guarded_problem = replace(weighted_problem, map_=context.guard.wrap(weighted_problem.map_, SCREENING))
+    effects = [
         effect
         for effect in catalogue
         if effect.name not in (PLAY, RIVAL_EFFECT) and not context.excluded.intersection(effect.simpler)
     ]
-    allowed_names = {effect.name for effect in allowed_effects}
+    allowed_names = {effect.name for effect in effects}
     first_round = explanation.rounds[0] if explanation.rounds else ()
-    fitted_hypotheses = [candidate.fitted.hypothesis for candidate in first_round if candidate.newest in allowed_names]
-    return [*list_candidates(allowed_effects, evidence, context.guard.wrap(context.map_, STARTING)), *fitted_hypotheses]
+    tried_hypotheses = [candidate.fitted.hypothesis for candidate in first_round if candidate.newest in allowed_names]
+    tried_starts, has_all_tried = _evaluate_starts(guarded_problem, play_fit, tried_hypotheses, time_left)
+    best_start = min(tried_starts, key=_get_cost, default=None)
+    if best_start is not None and best_start.cost <= SUFFICIENT_COST:
+        shown_effect = best_start.hypothesis.claims[-1].effect
+        related = {*shown_effect.simpler, *(effect.name for effect in list_relatives(shown_effect.name, effects))}
+        effects = [effect for effect in effects if effect.name in related]
+        tried_starts = [start for start in tried_starts if start.hypothesis.claims[-1].effect.name in related]
+    suggested_hypotheses = _suggest_second_effects(context, play_fit, effects)
+    starts, has_all_starts = _evaluate_starts(guarded_problem, play_fit, suggested_hypotheses, time_left)
+    return [*tried_starts, *starts], has_all_tried and has_all_starts
+
+
+def _suggest_second_effects(
+    context: SearchContext, play_fit: BandPowerFit, effects: Sequence[Effect]
+) -> tuple[Hypothesis, ...]:
+    """Suggest hypotheses of these effects with starting values from the residuals of play."""
+    waveform_fit = evaluate_fit(context.measure, context.tuning, play_fit.deviations, play_fit.hypothesis)
+    evidence = gather_evidence(context.measure, context.tuning, waveform_fit)[0]
+    return list_candidates(effects, evidence, context.guard.wrap(context.map_, STARTING))
 
 
 def _fit_starts(
@@ -131,25 +153,35 @@ def _refine_fits(
     first_fits: Sequence[BandPowerFit],
     time_left: TimeBudget,
 ) -> tuple[list[tuple[float, BandPowerFit]], bool]:
-    """Refine the fits together with the model's parameters, until one has `SUFFICIENT_COST`. Returns costs and fits,
-    the best first, and whether the time sufficed. problems: without weights, and weighted by the chance variation of
-    play, from which the costs are."""
+    """Refine the fits together with the model's parameters, until one has `SUFFICIENT_COST`; where no time is left for
+    the first, it is kept as it is. Returns costs and fits, the best first, and whether the time sufficed. problems:
+    without weights, and weighted by the chance variation of play, from which the costs are."""
     problem, weighted_problem = problems
     fits: list[tuple[float, BandPowerFit]] = []
+    is_complete = True
     for start in first_fits:
-        if not time_left():
-            return sorted(fits, key=lambda fit: fit[0]), False
-        effect_name = start.hypothesis.claims[-1].effect.name
-        fitted = context.guard.run(effect_name, FITTING, partial(_refine_weighted, problem, start, time_left), start)
-        fits.append((evaluate_hypothesis(weighted_problem, fitted.deviations, fitted.hypothesis).cost, fitted))
-        if fits[-1][0] <= SUFFICIENT_COST:
+        is_complete = time_left()
+        if not is_complete and fits:
             break
-    return sorted(fits, key=lambda fit: fit[0]), True
+        refine_start = partial(refine_weighted, problem, start, time_left)
+        effect_name = start.hypothesis.claims[-1].effect.name
+        fitted = context.guard.run(effect_name, FITTING, refine_start, start) if is_complete else start
+        fits.append((evaluate_hypothesis(weighted_problem, fitted.deviations, fitted.hypothesis).cost, fitted))
+        if fits[-1][0] <= SUFFICIENT_COST or not is_complete:
+            break
+    return sorted(fits, key=lambda fit: fit[0]), is_complete
 
 
-def _refine_weighted(problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
+def refine_weighted(problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
     """Refine a fit under the weights of its own chance variation."""
-    return refine_band_power(weight_by_chance_variation(problem, start), start, time_left)
+    return refine_from(weight_by_chance_variation(problem, start), start, time_left)
+
+
+def refine_from(weighted_problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
+    """Refine a fit under new weights, the chance variation of its start: first the cost of the start is computed under
+    these, because a refinement must not be compared with a cost under others."""
+    weighted_start = evaluate_hypothesis(weighted_problem, start.deviations, start.hypothesis)
+    return refine_band_power(weighted_problem, weighted_start, time_left)
 
 
 def _evaluate_starts(

@@ -14,22 +14,18 @@ import numpy.typing as npt
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.hypothesis import Hypothesis, has_motion_forces
 from analysis.diagnosis.errors.output_error import (
     Fitted,
     Sensitivity,
-    build_jacobian,
     evaluate_fit,
-    fit,
     stack_fit_residuals,
 )
 from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion
 from analysis.diagnosis.forces.inverse_response import compute_transmission_zeros
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.limits import FITTING_GAIN_SHARE, RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE
+from analysis.diagnosis.limits import RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE
 from analysis.diagnosis.noise.periods import find_settled_periods
-from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
-from analysis.diagnosis.search.search_context import FITTING, SCREENING, SearchContext, compute_sensitivity, fit_first
+from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.effects.simulation.bodies import Restarts
@@ -251,50 +247,3 @@ def _cut_record(record: Observed, kept: Indices, fit: Mask) -> Observed:
     """Reduce a record to the kept samples. Samples to fit are also those to choose by; none is held out."""
     is_held_out = np.zeros(len(kept), dtype=np.bool_)
     return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], is_held_out)
-
-
-def fit_on_short_recordings(
-    context: SearchContext,
-    short_form: ShortRecordings,
-    base: Fitted,
-    invariant: Sequence[Hypothesis],
-    varying: Sequence[Hypothesis],
-) -> list[Fitted]:
-    """Fit hypotheses on short recordings, then by at most one step on all samples; returns the finite fits, the best
-    first. invariant, varying: without and with dependence on time; the latter cannot be compared on short recordings,
-    so all samples are used, only where the predicted gain is not far below the former's (`_keep_promising`)."""
-    short, guard = replace(short_form.context, measure=coarsen_steps(short_form.context.measure)), context.guard
-    short_base = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
-    jacobian = compute_sensitivity(short, base.deviations, base.hypothesis, with_forces=True)
-    screened = screen(short.measure, short.tuning, short_base, jacobian, invariant, guard.wrap(short.map_, SCREENING))
-    full_jacobian, has_forces = short_form.repeat_sensitivity(jacobian), has_motion_forces(base.hypothesis)
-    if has_forces:
-        full_jacobian = build_jacobian(context.measure, context.tuning, base.deviations, base.hypothesis, context.map_)
-
-    def fit_to_all(fitted: Fitted) -> Fitted:
-        full_fit = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-        # One Gauss-Newton step on all samples fits the slow drift under friction, which one period does not contain.
-        return fit(context.measure, context.tuning, full_fit, full_jacobian, 1) if has_forces else full_fit
-
-    guarded_map, short_fits = (guard.wrap(context.map_, FITTING), fit_first(short, short_base, jacobian, screened))
-    fits: list[Fitted] = list(guarded_map(fit_to_all, short_fits))  # type: ignore[arg-type]
-    if varying:
-        coarse = replace(context, measure=coarsen_steps(context.measure))
-        coarse_base = evaluate_fit(coarse.measure, context.tuning, base.deviations, base.hypothesis)
-        screened = screen(
-            coarse.measure, context.tuning, coarse_base, full_jacobian, varying, guard.wrap(context.map_, SCREENING)
-        )
-        promising = _keep_promising((short_base, short_fits), coarse_base, screened)
-        fits += guarded_map(fit_to_all, fit_first(coarse, coarse_base, full_jacobian, promising))  # type: ignore[arg-type]
-    # Hypotheses whose parameters the short recordings do not determine may diverge on all samples: left out.
-    return sorted((trial for trial in fits if np.isfinite(trial.cost)), key=lambda trial: trial.cost)
-
-
-def _keep_promising(
-    reference: tuple[Fitted, Sequence[Fitted]], coarse_base: Fitted, screened: Sequence[ScreenedHypothesis]
-) -> list[ScreenedHypothesis]:
-    """Keep hypotheses whose predicted relative reduction of the cost is at least `FITTING_GAIN_SHARE` times the largest
-    of the reference; relative, because its costs refer to other samples and steps. reference: base fit, and fits."""
-    base, fits = reference
-    best = max((1 - trial.cost / base.cost for trial in fits), default=0.0)
-    return [trial for trial in screened if 1 - trial.cost / coarse_base.cost >= max(FITTING_GAIN_SHARE * best, 0.0)]

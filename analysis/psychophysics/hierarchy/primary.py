@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.psychophysics.group_contrasts import Contrast, compute_contrasts, compute_pair_contrast
+from analysis.psychophysics.group_contrasts import ROUNDING_DB, Contrast, compute_contrasts, compute_pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
@@ -220,7 +220,7 @@ def _test_frequency_effect(
     elif is_complete.sum() > 1:
         fit = fit_hierarchy(select_persons(answers, is_complete), family)
         complete_db[is_complete], converged = compute_pseudo_thresholds(fit), fit.converged
-    return analyse_repeated_measures(answers.subjects, complete_db.tolist()), converged
+    return analyse_repeated_measures(answers.subjects, complete_db.tolist(), ROUNDING_DB), converged
 
 
 def select_persons(answers: Answers, is_selected: NDArray[np.bool_]) -> Answers:

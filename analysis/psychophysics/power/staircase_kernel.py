@@ -23,6 +23,13 @@ LEVEL_TOLERANCE_DB = 1e-9
 LARGEST_T_BY_FAMILY = (3.2, 25.0, 6.7)
 """Upper limit of t by family (Weibull, logistic, Gauss), where 1 - F is 1e-11 to 2e-11: above it, wrong answers occur
 practically by lapses only."""
+EMPTY_TABLE = np.empty((0, 4))
+"""Table of delivered stimuli of an ideal device: the delivered stimulus is the commanded one."""
+NO_DIRECTION_DB = -400.0
+"""Change of the equivalent level (dB) for a motion with no preferred direction, off-axis at least as large as
+on-axis."""
+MAX_PRESENTATIONS = 5
+"""Largest number of presentations of a trial, as `max_looks` of `study.participants.unsure_repeater.UnsureRepeater`."""
 
 
 class PackedRule(NamedTuple):
@@ -72,13 +79,6 @@ def pack_rule(rule: StaircaseRule, rove_db: float = 0.0) -> PackedRule:
         rule.trial_limit,
         rove_db,
     )
-
-
-EMPTY_TABLE = np.empty((0, 4))
-"""Table of delivered stimuli of an ideal device: the delivered stimulus is the commanded one."""
-NO_DIRECTION_DB = -400.0
-"""Change of the equivalent level (dB) for a motion with no preferred direction, off-axis at least as large as
-on-axis."""
 
 
 class Participant(NamedTuple):
@@ -168,10 +168,6 @@ def compute_equivalent_level_db(person: Participant, level_db: float, is_directi
     if person.adaptation_db > 0.0:
         equivalent_db += person.adaptation_db * math.expm1(-trial / person.adaptation_trials)
     return equivalent_db
-
-
-MAX_PRESENTATIONS = 5
-"""Largest number of presentations of a trial, as `max_looks` of `study.participants.unsure_repeater.UnsureRepeater`."""
 
 
 @njit(cache=True)

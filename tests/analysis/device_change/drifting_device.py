@@ -7,6 +7,7 @@ that round, an accelerometer with noise.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -35,39 +36,49 @@ ROUNDING_M, NOISE_MPS2 = 8.8e-6, (0.04, 0.04, 0.07)
 
 def play(wave_n, truths: list[Truth], levels_n, seed: int) -> list[Recording]:
     """One kept period for each probe. wave_n (n, 3); truths, levels_n: of each probe."""
-    draw = np.random.default_rng(seed)
-    each = {name: np.array([getattr(t, name) for t in truths], float)[:, None] for name in vars(Truth())}
-    shape, dt = (len(truths), 3), 1.0 / RATE_HZ / SUBSTEPS
-    x, v, bristle = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    modes = [[np.zeros(shape), np.zeros(shape)] for _ in MODES]
-    n, levels = len(wave_n), np.asarray(levels_n)[:, None]
-    waiting = [np.zeros(shape)] * 10
-    felt = np.zeros(shape)
-    rows = {"command": [], "excitation": [], "position": [], "acceleration": []}
-    for tick in range(PERIODS * n):
-        read = ROUNDING_M * np.round(x / ROUNDING_M)
-        excitation = levels * wave_n[tick % n] * min(1.0, tick / 250)
-        command = excitation - SPRING_N_PER_M * read
-        waiting = [command, *waiting[:-1]]
-        late = np.choose(each["delay_ticks"].astype(int), waiting[:4])
-        for _ in range(SUBSTEPS):
-            force = each["gain"] * late - (DAMPING + each["hand_n_s_per_m"]) * v - each["hand_n_per_m"] * x
-            bristle = np.clip(bristle + v * dt / BRISTLE_M * (1 - np.sign(v) * bristle), -1, 1)
-            force = force - each["friction_n"] * bristle
-            for (kg, hz, ratio), mode in zip(MODES, modes, strict=True):
-                w = 2 * np.pi * hz
-                pull = kg * (w**2 * (mode[0] - x) + 2 * ratio * w * (mode[1] - v))
-                force = force + pull
-                mode[1] = mode[1] - pull / kg * dt
-                mode[0] = mode[0] + mode[1] * dt
-            a = force / (MASS_KG + each["hand_kg"])
-            v = v + a * dt
-            x = x + v * dt
-        if tick >= (PERIODS - 1) * n:
-            for name, row in zip(rows, (command, excitation, read, felt), strict=True):
-                rows[name].append(row)
-        felt = a + draw.normal(size=shape) * NOISE_MPS2
-    return [_recording({name: np.array(found)[:, probe] for name, found in rows.items()}) for probe in range(shape[0])]
+    each = np.array([list(vars(truth).values()) for truth in truths], float)
+    noise = np.random.default_rng(seed).normal(size=(PERIODS * len(wave_n), len(truths), 3)) * NOISE_MPS2
+    levels = np.asarray(levels_n, float)
+    rows = _move(np.asarray(wave_n, float), each, levels, noise, np.array(MODES), BRISTLE_M)
+    names = ("command", "excitation", "position", "acceleration")
+    return [_recording(dict(zip(names, rows[:, :, probe], strict=True))) for probe in range(len(truths))]
+
+
+@njit(cache=True)
+def _move(wave_n, truths, levels, noise, hung, bristle_m):
+    """(4, n, probes, 3): command, excitation, position and acceleration as they are read."""
+    n, shape, dt = len(wave_n), (len(truths), 3), 1.0 / RATE_HZ / SUBSTEPS
+    rows = np.zeros((4, n, *shape))
+    for probe in range(shape[0]):
+        friction_n, hand_kg, hand_n_s_per_m, hand_n_per_m, gain, delay_ticks = truths[probe]
+        for axis in range(3):
+            x, v, bristle, felt = 0.0, 0.0, 0.0, 0.0
+            modes, waiting = np.zeros((len(hung), 2)), np.zeros(11)
+            for tick in range(PERIODS * n):
+                read = ROUNDING_M * np.round(x / ROUNDING_M)
+                excitation = levels[probe] * wave_n[tick % n, axis] * min(1.0, tick / 250)
+                command = excitation - SPRING_N_PER_M * read
+                waiting[1:] = waiting[:-1].copy()
+                waiting[0] = command
+                a = 0.0
+                for _ in range(SUBSTEPS):
+                    force = gain * waiting[int(delay_ticks)] - (DAMPING + hand_n_s_per_m) * v - hand_n_per_m * x
+                    bristle = min(max(bristle + v * dt / bristle_m * (1 - np.sign(v) * bristle), -1.0), 1.0)
+                    force -= friction_n * bristle
+                    for mode, (kg, hz, ratio) in zip(modes, hung):  # noqa: B905 - numba knows no `strict`
+                        w = 2 * np.pi * hz
+                        pull = kg * (w**2 * (mode[0] - x) + 2 * ratio * w * (mode[1] - v))
+                        force += pull
+                        mode[1] -= pull / kg * dt
+                        mode[0] += mode[1] * dt
+                    a = force / (MASS_KG + hand_kg)
+                    v += a * dt
+                    x += v * dt
+                kept = tick - (PERIODS - 1) * n
+                if kept >= 0:
+                    rows[:, kept, probe, axis] = command, excitation, read, felt
+                felt = a + noise[tick, probe, axis]
+    return rows
 
 
 def _recording(rows) -> Recording:

@@ -43,11 +43,6 @@ FREE_LAWS = frozenset({*FREE_SPEED_LAWS, *FREE_POSITION_LAWS, "product_of_positi
 """Names of all laws of this file; a diagnosis reports their formulas as `discovered_law`."""
 
 
-def list_excluded_laws(excluded_effects: Iterable[str], discovery: bool) -> frozenset[str]:
-    """List the laws that the force balance leaves out: these effects and, without discovery, all of `FREE_LAWS`."""
-    return frozenset(excluded_effects) | (frozenset() if discovery else FREE_LAWS)
-
-
 POWERS, POWER_BOUNDS = (0.3, 0.6, 1.5, 2.0, 3.0, 4.5), ((0.05, 6.0),)
 """Tried exponents, and bounds of their refinement; 6 is the largest that a search by simulation names as well."""
 SPEED_SHARES = (0.03, 0.1, 0.3, 1.0)
@@ -72,12 +67,17 @@ PRODUCTS: dict[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] 
 """Products of position q and velocity v, or the smoothed sign of v, by their formula."""
 
 
+def list_excluded_laws(excluded_effects: Iterable[str], discovery: bool) -> frozenset[str]:
+    """List the laws that the force balance leaves out: these effects and, without discovery, all of `FREE_LAWS`."""
+    return frozenset(excluded_effects) | (frozenset() if discovery else FREE_LAWS)
+
+
 def make_free_laws(channel: int, scales: Scales) -> Iterator[Law]:
     """Make all free laws of one channel of the motion. Without a time axis, only those of the position; without speed,
     none of the speed alone; for a shaft that turns freely or without travel, only those of the speed."""
     if np.isfinite(scales.band_hz) and scales.speed > 0:
         yield from _make_speed_laws(channel, scales.speed)
-    if scales.turns or not scales.travel > 0:
+    if scales.turns_freely or not scales.travel > 0:
         return
     yield from _make_position_laws(channel, scales)
     yield from _make_contact_laws(channel, scales)

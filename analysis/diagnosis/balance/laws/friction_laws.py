@@ -67,7 +67,9 @@ def make_friction_laws(channel: int, scales: Scales) -> Iterator[Law]:
             "stribeck_friction", channel, (float(stribeck_speed),),
             _make_stribeck_columns(channel, least_width), _convert_stribeck, bounds=speed_bounds,
         )  # fmt: skip
-    presliding_lengths = np.geomspace(0.003, 0.5, 7) if scales.turns else scales.travel * np.geomspace(0.001, 0.3, 9)
+    presliding_lengths = (
+        np.geomspace(0.003, 0.5, 7) if scales.turns_freely else scales.travel * np.geomspace(0.001, 0.3, 9)
+    )
     for length in presliding_lengths:
         yield Law(
             "presliding_hysteresis", channel, (float(length),),
@@ -77,7 +79,7 @@ def make_friction_laws(channel: int, scales: Scales) -> Iterator[Law]:
     yield Law("asymmetric_friction", channel, (), _make_asymmetric_columns(channel, least_width), _convert_asymmetric)
     if np.isfinite(scales.band_hz):
         yield Law("drifting_friction", channel, (), _make_drifting_columns(channel, least_width), _convert_drifting)
-    if not scales.turns:
+    if not scales.turns_freely:
         yield Law(
             "position_dependent_friction",
             channel,

@@ -101,8 +101,9 @@ class Scales:
     """Duration of all fit samples in s."""
     band_hz: float
     """Upper end of the band in Hz; infinite without a time axis."""
-    turns: bool
-    """Whether it is a shaft that makes more than two turns: only the position within a turn matters."""
+    turns_freely: bool
+    """Whether it is a shaft that makes more than two turns: it has no stiffness, and only the position within a turn
+    matters."""
     rotational: bool
     """Whether positions are angles in rad."""
 
@@ -115,8 +116,8 @@ def measure_scales(motions: Sequence[Motion], channel: int, rotational: bool) ->
     low, high = float(position.min()), float(position.max())
     duration_s = sum(int(motion.fit.sum()) for motion in motions) / motions[0].rate_hz
     speed = float(np.sqrt(np.mean(velocity**2)))
-    turns = rotational and high - low > 4 * np.pi
-    return Scales(speed, high - low, low, high, duration_s, motions[0].band_hz, turns, rotational)
+    turns_freely = rotational and high - low > 4 * np.pi
+    return Scales(speed, high - low, low, high, duration_s, motions[0].band_hz, turns_freely, rotational)
 
 
 def compute_relative_time(motion: Motion) -> FloatArray:

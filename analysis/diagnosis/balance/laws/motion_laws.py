@@ -116,7 +116,7 @@ def find_likely_pitches(
     shortest_pitch = scales.speed / scales.band_hz
     if shortest_pitch >= longest_pitch or not len(residual):
         return []
-    wavenumber_spacing = 1 / (2 * np.pi) if scales.turns else WAVENUMBER_SPACING / scales.travel
+    wavenumber_spacing = 1 / (2 * np.pi) if scales.turns_freely else WAVENUMBER_SPACING / scales.travel
     wavenumbers = 1 / longest_pitch + wavenumber_spacing * np.arange(MOST_WAVENUMBERS)
     wavenumbers = wavenumbers[wavenumbers * shortest_pitch < 1]
     stride = max(len(q) // MOST_SPECTRUM_SAMPLES, 1)
@@ -142,7 +142,7 @@ def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
             lambda motion, _: np.hstack([np.sin(motion.position[:, [channel]]), np.cos(motion.position[:, [channel]])]),
             lambda w, n, mass: {"torque": float(np.hypot(*w)), "angle": float(np.arctan2(w[1], w[0]))},
         )  # fmt: skip
-    if scales.turns:
+    if scales.turns_freely:
         return
     yield Law(
         "hardening_stiffness", channel, (), lambda motion, _: motion.position[:, [channel]] ** 3, name_weights("k3")
@@ -189,7 +189,7 @@ def _make_stop_columns(channel: int, side: float) -> Columns:
 def make_dynamic_laws(channel: int, scales: Scales) -> Iterator[Law]:
     """Make pose-dependent inertia (not for a shaft that turns), an extra mode on a grid of frequencies and damping
     ratios, and amplifier lag along a channel."""
-    if not scales.turns:
+    if not scales.turns_freely:
         # Lagrange's equation of a mass M (1 + c x) adds M c (x a + v² / 2) to M a; the weight is M c.
         yield Law(
             "pose_dependent_inertia", channel, (),

@@ -71,10 +71,10 @@ def compute_law_signature(
         name: compute_correlation_ratio(variables[name].values[is_used], force[is_used]) for name in law.variables
     }
     variable = variables[max(correlation_ratios, key=lambda name: correlation_ratios[name])]
-    abscissa, visited_range = variable.name, None
+    visited_range = None
     if max(correlation_ratios.values()) < _MAIN_CORRELATION_RATIO:  # only the variables together explain most of it
         variable = _Variable(f"force of the law ({unit_system.force})", force)
-        abscissa, law_abscissa, law_force = variable.name, *_make_identity_line(force[is_used])
+        law_abscissa, law_force = _make_identity_line(force[is_used])
     elif len(law.variables) == 1 and not has_memory(law):
         law_abscissa, law_force, visited_range = _evaluate_extrapolated(law, variable.values[is_used], rate_hz)
     else:
@@ -83,7 +83,7 @@ def compute_law_signature(
     return Signature(
         placed_effect.effect.name,
         axes[axis],
-        abscissa,
+        variable.name,
         f"missing force ({unit_system.force})",
         bin_centres,
         mean,

@@ -66,7 +66,7 @@ def test_a_dead_band_leaves_the_dry_friction_beside_it(rubbing_dead_band):
 
 @pytest.mark.slow
 def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
-    assert dead_band.error < 0.5 * dead_band.linear
+    assert dead_band.error < 0.5 * dead_band.linear_error
 
 
 @pytest.mark.slow

@@ -40,6 +40,7 @@ def hunting_balance(record_samples, find_balance):
     return position, find_balance(record_samples(force, position, RATE_HZ))[0]
 
 
+@pytest.mark.slow
 def test_friction_of_an_axis_that_rests_at_its_targets_is_named(hunting_balance):
     position, balance = hunting_balance
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)

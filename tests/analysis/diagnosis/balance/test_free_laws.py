@@ -10,6 +10,7 @@ from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.laws.law import parse_law
 from tests.analysis.diagnosis.balance.invented_axis import make_recording, random_course
+from tests.slow_instances import slow, slow_rows
 
 RATE_HZ, MASS_KG, DAMPING, STIFFNESS = 250.0, 0.3, 2.0, 100.0
 
@@ -53,8 +54,8 @@ def record(kind, seed, seconds=30.0):
     return make_recording(force[:, None], (move(kind, force, 20) + noise)[:, None], RATE_HZ)
 
 
-def find_law(kind, seed):
-    found = diagnose_values(record(kind, seed), settings=DiagnosisSettings(discovery=True)).diagnosis
+def find_law(kind, seed, seconds):
+    found = diagnose_values(record(kind, seed, seconds), settings=DiagnosisSettings(discovery=True)).diagnosis
     (effect,) = found.effects
     assert effect.effect == "discovered_law"
     assert effect.class_ == ()  # the internal names of free laws are no names of physics
@@ -64,44 +65,50 @@ def find_law(kind, seed):
 
 
 @pytest.mark.parametrize(
-    "kind, seed, variables, numbers",
+    "kind, seed, seconds, variables, numbers",
     [
-        (1, 21, ("vx",), (7.2, 1.5)),
-        (2, 21, ("vx", "x"), (6000.0,)),
-        pytest.param(3, 22, ("x",), (0.3, 0.012), marks=pytest.mark.slow),
-        pytest.param(4, 22, ("vx",), (12.0, 0.2), marks=pytest.mark.slow),
-        pytest.param(5, 21, ("x",), (0.004, 0.06), marks=pytest.mark.slow),
+        (1, 21, 12.0, ("vx",), (7.2, 1.5)),
+        *slow_rows(
+            (1, 21, 30.0, ("vx",), (7.2, 1.5)),
+            (2, 21, 30.0, ("vx", "x"), (6000.0,)),
+            (3, 22, 30.0, ("x",), (0.3, 0.012)),
+            (4, 22, 30.0, ("vx",), (12.0, 0.2)),
+            (5, 21, 30.0, ("x",), (0.004, 0.06)),
+        ),
     ],
 )
-def test_an_invented_law_is_recovered(kind, seed, variables, numbers):
-    found_variables, found_numbers = find_law(kind, seed)
+def test_an_invented_law_is_recovered(kind, seed, seconds, variables, numbers):
+    found_variables, found_numbers = find_law(kind, seed, seconds)
     assert found_variables == variables
     assert found_numbers[: len(numbers)] == pytest.approx(numbers, rel=0.05)
 
 
+@pytest.mark.slow
 def test_friction_is_named_in_addition_to_a_free_law(find_balance):
     balance = find_balance(record(6, 23))[0]
     named = {law.law.effect: law.formula and law.formula.text for law in balance.named}
     assert named == {"product_of_position_and_speed": "-p0*q**2*v", "coulomb_friction": None}
 
 
-def test_no_formula_withdraws_the_name_of_friction(find_balance):
-    balance = find_balance(record(7, 24))[0]
+@pytest.mark.parametrize("seconds", [12.0, *slow(30.0)])
+def test_no_formula_withdraws_the_name_of_friction(find_balance, seconds):
+    balance = find_balance(record(7, 24, seconds))[0]
     assert "coulomb_friction" in {law.law.effect for law in balance.named}
 
 
-@pytest.mark.parametrize("seed", [31, pytest.param(32, marks=pytest.mark.slow)])
-def test_nothing_is_named_where_nothing_is_missing(find_balance, seed):
-    assert not find_balance(record(0, seed))[0].named
+@pytest.mark.parametrize(("seed", "seconds"), [(31, 12.0), *slow_rows((31, 30.0), (32, 30.0))])
+def test_nothing_is_named_where_nothing_is_missing(find_balance, seed, seconds):
+    assert not find_balance(record(0, seed, seconds))[0].named
 
 
+@pytest.mark.slow
 def test_a_friction_of_the_catalogue_keeps_its_name(find_balance, axis_module):
     balance = find_balance(axis_module.record_axis(axis_module.Physics(coulomb=1.0)))[0]
     assert {law.law.effect for law in balance.named} == {"coulomb_friction"}
 
 
 def test_without_discovery_no_free_law_is_tried(find_balance):
-    balance = find_balance(record(1, 21), without=FREE_LAWS)[0]
+    balance = find_balance(record(1, 21, seconds=8.0), without=FREE_LAWS)[0]
     assert {law.law.effect for law in balance.laws}.isdisjoint(FREE_LAWS)
 
 

@@ -48,6 +48,7 @@ def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(find_bala
     assert named.law.effect in find_family("coulomb_friction")
 
 
+@pytest.mark.slow
 def test_a_named_spring_does_not_hide_friction_that_two_laws_share(find_balance):
     """The balance holds two frictions, of which neither seems necessary beside the other."""
     (balance,) = find_balance(simulate_motor(LEVEL_N, 0.0, 1, spring_n_per_m2=0.1, noise_share=0.03))

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import interp1d
 
-RATE_HZ, SECONDS, LATE_S = 200.0, 25.0, 0.02
+RATE_HZ, SECONDS, LATE_S = 200.0, 15.0, 0.02
 MASS, DAMPING, STIFFNESS, LEVEL = 0.1, 0.8, 20.0, 0.6
 FAR_MASS, JOINT, JOINT_DAMPING = 0.06, 30.0, 0.05
 

@@ -148,3 +148,27 @@ def test_an_axis_that_rests_in_one_of_several_recordings_is_a_motion_of_all(reco
     for recordings in ((first, second), (second, first)):
         assert [signal.samples.shape for signal in find_motion_signals(recordings)] == [both.shape] * 2
     assert find_motion_signals([second, second])[0].samples.shape == (len(both), 1)
+
+
+@pytest.mark.parametrize(("order", "quantity"), [(0, "position"), (2, "acceleration")])
+@pytest.mark.parametrize("rest", [0.0, 9.81, "noise"])
+def test_axes_that_are_driven_in_turn_have_the_band_of_each(record_samples, order, quantity, rest):
+    noise = 0.03 * exact_derivative(order).std() * np.random.default_rng(7).standard_normal((COUNT, 2))
+    read = exact_derivative(order) + noise[:, :1]
+    idle = noise[:, 1:] if rest == "noise" else np.full((COUNT, 1), rest)
+    alone = observe_motion(record_samples(exact_derivative(2), read, RATE_HZ, quantity))
+    pairs = [np.hstack(columns) for columns in ((read, idle, idle), (idle, read, idle), (idle, idle, read))]
+    in_turn = compute_motions(
+        observe_parts([record_samples(exact_derivative(2), pair, RATE_HZ, quantity) for pair in pairs], 3)
+    )
+    assert (in_turn[0].band_hz, in_turn[0].lowest_hz) == (alone.band_hz, alone.lowest_hz)
+
+
+def test_gravity_in_a_measured_acceleration_moves_nothing(record_samples):
+    level, tilted = (
+        observe_motion(record_samples(exact_derivative(2), exact_derivative(2) + offset, RATE_HZ, "acceleration"))
+        for offset in (0.0, 9.81)
+    )
+    assert tilted.position == pytest.approx(level.position, abs=1e-9)
+    assert tilted.velocity == pytest.approx(level.velocity, abs=1e-9)
+    assert tilted.decimate(tilted.acceleration) == pytest.approx(level.decimate(level.acceleration), abs=1e-9)

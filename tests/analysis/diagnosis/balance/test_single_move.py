@@ -33,6 +33,7 @@ def test_a_single_step_tests_and_names_no_law(find_move_balance):
     assert not found.further_laws
 
 
+@pytest.mark.slow
 def test_many_steps_show_the_friction(find_move_balance):
     found = find_move_balance(12)
     assert found.tested

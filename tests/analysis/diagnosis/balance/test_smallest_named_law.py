@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance import balances
+from analysis.diagnosis.balance.change_laws import append_laws
 from analysis.diagnosis.balance.compare_free_laws import withdraw_names_of_surpassed_sum
 from analysis.diagnosis.balance.judge_laws import _find_objection, judge_structure
 from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS
@@ -74,7 +75,7 @@ def judge_two_laws(record_samples, main_effect):
         Law("hardening_stiffness", 0, (), lambda m, _: m.position[:, :1] ** 3, name_weights("k3")),
     )
     motions = compute_motions(observe_parts([record_samples(force[:, None], position[:, None], RATE_HZ)], 1))
-    regression = build_regression(motions, 0, laws, turns=False)
+    regression = build_regression(motions, 0, laws, turns_freely=False)
     linear, both = (Structure(k, regression.cross_validate(regression.select_columns(k))) for k in ((), (0, 1)))
     return judge_structure(StructureSearch(regression, linear, both, (both, linear), True), both)
 
@@ -117,5 +118,25 @@ def test_no_law_is_named_from_the_cut_peaks_of_an_accelerometer(
 )
 def test_a_sum_of_unlike_laws_is_not_named_where_a_single_law_explains_more(record_samples, free_sum, share, is_named):
     balance = judge_two_laws(record_samples, "coulomb_friction")
-    found = withdraw_names_of_surpassed_sum(balance, [Structure(free_sum, share * balance.chosen.errors)])
+    sums = [Structure(free_sum, share * balance.chosen.errors)]
+    found = withdraw_names_of_surpassed_sum(balance, balance.search.regression, sums)
     assert len(found.named) == (2 if is_named else 0)
+
+
+@pytest.mark.parametrize(
+    ("free_law", "share", "is_named"),
+    [
+        ("product_of_position_and_speed", 0.5, False),
+        ("product_of_position_and_speed", 0.99, True),
+        ("power_of_speed", 0.5, True),
+    ],
+    ids=["of other arguments", "no better", "of the same argument"],
+)
+def test_a_law_is_not_named_where_one_of_other_arguments_explains_more(record_samples, free_law, share, is_named):
+    """A friction that grows with the square of the position is no quadratic damping."""
+    balance = judge_two_laws(record_samples, "coulomb_friction")
+    friction_alone = replace(balance, laws=tuple(law for law in balance.laws if law.law.effect == "coulomb_friction"))
+    made = Law(free_law, 0, (), lambda m, _: m.position[:, :1] ** 2 * np.sign(m.velocity[:, :1]), name_weights("p0"))
+    regression = append_laws(balance.search.regression, [made])
+    sums = [Structure((2,), share * balance.chosen.errors)]
+    assert bool(withdraw_names_of_surpassed_sum(friction_alone, regression, sums).named) == is_named

@@ -57,7 +57,7 @@ def test_what_a_given_model_lacks_is_named_by_the_balance(friction_balance):
 def test_a_device_within_its_calibration_lacks_nothing(mass):
     (balance,) = find_balances_with_model((record_friction(0.0, mass),), GIVEN, frozenset(), grant_time)
     assert balance.named == ()
-    assert balance.linear < 0.05
+    assert balance.linear_error < 0.05
 
 
 def test_a_calibrated_number_does_not_take_friction_on_itself(friction_balance):

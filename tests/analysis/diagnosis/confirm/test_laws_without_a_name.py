@@ -33,7 +33,8 @@ def effects_by_name(found):
     return {effect.effect: effect for effect in found.diagnosis.effects}
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_curve_of_a_valve_is_named_with_its_formula(seed):
     found = diagnose_values([record_driven_mass(valve_curve, seed)])
     named = effects_by_name(found)

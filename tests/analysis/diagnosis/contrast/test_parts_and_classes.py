@@ -39,7 +39,7 @@ def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
     clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
     lossy = replace(other[0], known=other[0].known & ~gone)
     compared = compare_base(next(build_bases(clean, other))[0][0], clean, (lossy,))
-    assert compared.faulty.count > 0.8 * compared.clean.count
+    assert compared.faulty.valid_row_count > 0.8 * compared.clean.valid_row_count
 
 
 @pytest.mark.slow
@@ -56,7 +56,7 @@ def test_a_side_of_takes_that_are_all_too_short_for_the_model_is_not_compared(sh
     takes = [{"start": start, "stop": start + 1000} for start in range(0, rig.COUNT - 999, 1000)]
     whole = split_into_parts([rig.record_rig(1)])
     in_takes = split_into_parts([replace(rig.record_rig(2), meta={"parts": takes})])
-    slow_model = AutoregressiveBase(channel=0, order=24, step=20, responses=1)
+    slow_model = AutoregressiveBase(channel=0, order=24, step=20, response_count=1)
     with pytest.raises(ValueError, match="too few samples"):
         compare_base(slow_model, *((in_takes, whole) if short == "clean" else (whole, in_takes)))
 

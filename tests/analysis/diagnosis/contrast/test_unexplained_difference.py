@@ -26,7 +26,8 @@ def test_nothing_is_left_open_where_a_fault_is_named(rig):
     assert found.comparison is not None and found.comparison.complete
 
 
-@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
 def test_nothing_is_left_open_between_recordings_of_the_same_device(rig, seed):
     assert not rig.make_contrast(seed=seed).is_unexplained
 
@@ -39,6 +40,7 @@ def test_the_comparison_overrules_a_search_that_leaves_more_than_noise_and_has_n
     assert not found.contradicts(frozenset({"extra_mode"}), residual_is_noise=True)
 
 
+@pytest.mark.slow
 def test_where_nothing_sets_the_sets_apart_only_what_was_not_compared_is_named(rig):
     found = rig.make_contrast(seed=2)
     assert found.contradicts(frozenset({"coulomb_friction"}), residual_is_noise=True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.measured_motion import stays_at_limit
+from analysis.diagnosis.data.readings_at_limit import stays_at_limit
 
 
 def draw_noise_in_band(samples, band_share=0.1):

@@ -28,6 +28,7 @@ from equalizer.effects.catalogue import CATALOGUE
 from equalizer.laws.evaluate import evaluate
 from tests.diagnosed import device
 from tests.lawful import PLAN, arena_of, law, recorded
+from tests.slow_instances import slow_rows
 
 DRAG = law("-p0*abs(vx)**1.5*sign(vx)", 3.0)
 
@@ -55,11 +56,13 @@ def search_for_laws(recording):
         pytest.param(law("p0*fx*sin(2*pi*x/p1)", 0.2, 0.013), "p0*fx*sin(2*pi*x/p1 + p2)", marks=pytest.mark.slow),
         # The fitted stretches travel 26.5 mm, at most 14 mm to one side: just one pitch.
         pytest.param(law("p0*fx*sin(2*pi*x/p1)", 0.3, 0.026), "p0*fx*sin(2*pi*x/p1 + p2)", marks=pytest.mark.slow),
-        (law("p0*lag(x, p1)", 40.0, 0.05), "p0*lag(x, p1)"),
+        *slow_rows((law("p0*lag(x, p1)", 40.0, 0.05), "p0*lag(x, p1)")),
         (law("p0", 0.1), "p0"),
-        (law("-p0*x*ax", 5.0), "p0*x*ax"),
-        (law("-p0*(x*ax + vx**2/2)", 5.0), "p0*(x*ax + vx**2/2)"),
-        pytest.param(law("-p0*(x**2*ax + x*vx**2)", 200.0), "p0*(x**2*ax + x*vx**2)", marks=pytest.mark.slow),
+        *slow_rows(
+            (law("-p0*x*ax", 5.0), "p0*x*ax"),
+            (law("-p0*(x*ax + vx**2/2)", 5.0), "p0*(x*ax + vx**2/2)"),
+            (law("-p0*(x**2*ax + x*vx**2)", 200.0), "p0*(x**2*ax + x*vx**2)"),
+        ),
         (law("-p0*maximum(abs(fx) - p1, 0)*sign(fx)", 0.6, 1.7), "fx + p0*maximum(abs(fx) - p1, 0)*sign(fx)"),
     ],
 )

@@ -187,3 +187,17 @@ def test_a_shortened_simulation_keeps_the_restarts_of_the_records_that_it_keeps(
         for residual, kept in zip(short.residuals(make_model(), ()), short.records, strict=True)
     )
     assert replace(measure, restarts=()).shorten().restarts == ()
+
+
+@pytest.mark.parametrize("place", [0.0, 9.81])
+def test_a_reading_that_never_changes_says_nothing_of_the_noise_of_others(
+    drifting_recording: Recording, place: float
+) -> None:
+    read = drifting_recording.response
+    noise = 0.01 * read.samples.std() * np.random.default_rng(3).standard_normal(read.samples.shape)
+    moving = replace(drifting_recording, response=replace(read, samples=read.samples + noise))
+    resting = replace(drifting_recording, response=replace(read, samples=np.full_like(noise, place)))
+    alone, both = (make_measure(each, make_model(400.0)).measure for each in ([moving], [moving, resting]))
+    assert isinstance(alone, FreeSimulation) and isinstance(both, FreeSimulation)
+    assert alone.noise == pytest.approx(noise.std(), rel=0.1)
+    assert both.noise == pytest.approx(alone.noise / np.sqrt(2), rel=0.01)

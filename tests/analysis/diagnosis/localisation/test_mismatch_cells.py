@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.localisation.mismatch_cells import Margin, Prediction, compute_mismatch_cells, learn_floor
+from analysis.diagnosis.localisation.mismatch_maps import adjust_for_model_error, collect_model_error
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 
 
@@ -110,6 +111,19 @@ def test_a_floor_knows_a_channel_by_its_other_inputs(device):
         one.output, one.quantity, one.input, one.band_hz
     )
     assert floor.get_share("aw", one.quantity, one.input, one.band_hz) == 0
+
+
+def test_a_channel_that_is_exactly_zero_in_a_recording_differs_beyond_doubt(device):
+    """No noise is measured there, and no ratio to it is a number that arithmetic cannot hold."""
+    recording, truth = record_with_prediction(device())
+    silent = recording.response.samples.copy()
+    silent[:, 1] = 0.0
+    with_silent = replace(recording, response=replace(recording.response, samples=silent))
+    large = Prediction(1000.0 * truth.response, truth.position)
+    cells = find_cells(with_silent, large)
+    for cell in adjust_for_model_error(cells, collect_model_error(cells)):
+        assert np.isfinite([cell.in_noise, cell.signal_in_noise, cell.p_value]).all()
+    assert all(cell.p_value < 1e-9 for cell in cells if (cell.output, cell.quantity) == ("ay", "acceleration"))
 
 
 def test_noise_that_is_not_known_gives_no_cells(device):

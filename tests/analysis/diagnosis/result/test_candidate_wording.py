@@ -22,7 +22,7 @@ from analysis.diagnosis.result.candidate_wording import (
     describe_class,
     format_candidate,
 )
-from analysis.diagnosis.result.error_wording import describe_ceiling
+from analysis.diagnosis.result.error_wording import describe_balance_errors
 from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.diagnosis.result.wording import describe_equivalents, describe_verdict, format_effect_title
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
@@ -144,17 +144,17 @@ def test_an_effect_without_a_class_is_called_by_its_own_name():
     assert format_effect_title(NAMED) == "dry friction on the x drive"
 
 
-def test_the_share_of_the_ceiling_is_one_of_powers():
-    (said,) = describe_ceiling((BalanceErrors("x", 0.5, 0.3, 0.1, True),))
+def test_the_share_of_the_reduction_by_all_laws_is_one_of_powers():
+    (said,) = describe_balance_errors((BalanceErrors("x", 0.5, 0.3, 0.1, True),))
     assert "alone is 50 % of the force; with all laws together it is 10 %" in said
     assert said.endswith(
         "with the named laws it is 30 %, and that is 67 % of the reduction of the error power that all laws together "
         "reach."
     )
-    (nothing,) = describe_ceiling((BalanceErrors("x", 0.5, 0.5, 0.1, False),))
+    (nothing,) = describe_balance_errors((BalanceErrors("x", 0.5, 0.5, 0.1, False),))
     assert nothing.endswith("no law is named.")
-    (best,) = describe_ceiling((BalanceErrors("x", 0.5, 0.1, 0.1, True),))
+    (best,) = describe_balance_errors((BalanceErrors("x", 0.5, 0.1, 0.1, True),))
     assert best.endswith("with the named laws it is 10 %, and all laws together reach no smaller error.")
-    assert describe_ceiling((BalanceErrors("x", 0.5, 0.5, 0.1, False),) * 2)[0].startswith(
+    assert describe_balance_errors((BalanceErrors("x", 0.5, 0.5, 0.1, False),) * 2)[0].startswith(
         "In the force balance along x,"
     )

@@ -175,6 +175,10 @@ def test_a_mismatch_without_a_name_gets_none():
     said = describe_verdict(make_diagnosis("unexplained"))
     assert said.startswith("Model and device disagree, and no effect of the catalogue explains it.")
     assert not any(words.noun in said for words in EFFECT_WORDS.values())
+    for noise_method in ("quiet band", "rest", "unknown"):  # the rest may be noise in the driven band
+        said = describe_verdict(make_diagnosis("unexplained"), device=DeviceWording(True, LINEAR, noise_method))
+        assert said.startswith("Model and recording differ, and no effect")
+        assert "only repeated periods" in said
 
 
 def test_unknown_errors_and_unknown_noise_are_reported():

@@ -84,6 +84,41 @@ def test_starts_end_in_time_and_what_was_evaluated_is_kept(true_level, monkeypat
     assert (len(starts), complete) == (len(suggested), True)
 
 
+@pytest.mark.parametrize(("true_n", "stops"), [(0.2, True), (100.0, False)])
+def test_beside_what_waveforms_and_band_powers_show_only_relatives_are_tried(true_level, monkeypatch, true_n, stops):
+    true_level[0] = true_n
+    suggested_names: list[str] = []
+
+    def suggest(context, play, effects):
+        suggested_names.extend(effect.name for effect in effects)
+        return GAINS
+
+    monkeypatch.setattr(second_effect, "replace", lambda view, **changes: view)
+    monkeypatch.setattr(second_effect, "_suggest_second_effects", suggest)
+    tried = [
+        SimpleNamespace(newest=hypothesis.claims[-1].effect.name, fitted=SimpleNamespace(hypothesis=hypothesis))
+        for hypothesis in (
+            friction(0.2),
+            make_claim_hypothesis(Claim(EFFECTS["force_gain"], "one", (0,)), [{"gain": 2}]),
+        )
+    ]
+    context = SimpleNamespace(excluded=frozenset(), guard=Guard(), map_=map)
+    starts, complete = second_effect._find_starts(
+        context, SimpleNamespace(rounds=(tried,)), (VIEW, PLAY), CATALOGUE, CountedBudget(99)
+    )
+    assert complete and starts[0].hypothesis.claims[-1].effect is DRY
+    assert len(starts) == (2 if stops else 3)
+    assert {"stribeck_friction", "presliding_hysteresis"} <= set(suggested_names)
+    assert ("mains_hum" not in suggested_names) == stops
+    assert not {"backlash", "loose_joint"} & set(suggested_names)
+
+
+def test_a_refinement_is_compared_with_its_start_under_the_same_weights(true_level, monkeypatch):
+    monkeypatch.setattr(second_effect, "refine_band_power", lambda problem, start, time_left: start)
+    start = SimpleNamespace(hypothesis=friction(1.0), deviations=np.zeros(0), cost=50.0)
+    assert second_effect.refine_from(VIEW, start, CountedBudget(9)).cost == pytest.approx(1.0)
+
+
 def test_of_each_effect_only_its_best_start_is_kept(true_level):
     starts = [second_effect.evaluate_hypothesis(VIEW, PLAY.deviations, friction(level)) for level in (3.0, 1.1, 2.0)]
     (best,) = second_effect._select_best_per_effect(starts)
@@ -96,7 +131,7 @@ def search_at_cost(monkeypatch):
 
     def search(play_cost: float, calls: int):
         fitted_names: list[str] = []
-        context = SimpleNamespace(guard=Guard())
+        context, explanation = SimpleNamespace(guard=Guard(), excluded=frozenset()), SimpleNamespace(rounds=())
         problem = BandPowerProblem(SimpleNamespace(), SimpleNamespace(), map)
         monkeypatch.setattr(second_effect, "weight_by_chance_variation", lambda problem, fit: problem)
         monkeypatch.setattr(
@@ -115,7 +150,9 @@ def search_at_cost(monkeypatch):
 
         monkeypatch.setattr(second_effect, "fit_band_power", fit)
         monkeypatch.setattr(second_effect, "refine_band_power", fit)
-        found = second_effect.search_second_effects(context, None, problem, PLAY, CATALOGUE, CountedBudget(calls))
+        found = second_effect.search_second_effects(
+            context, explanation, problem, PLAY, CATALOGUE, CountedBudget(calls)
+        )
         return found, fitted_names
 
     return search
@@ -134,6 +171,7 @@ def test_each_fit_ends_in_time(search_at_cost, calls, count):
     found, fitted_names = search_at_cost(13.0, calls)
     assert len(fitted_names) == count
     assert found.complete == (calls == 99)
+    assert bool(found.fits) == (count > 0)  # the best fit is kept where no time is left to refine it
 
 
 @pytest.fixture(scope="module")
@@ -165,14 +203,14 @@ def test_where_chance_alone_explains_the_band_powers_play_is_not_refined(recorde
     def refuse(problem, start, time_left):
         raise RefinedError
 
-    monkeypatch.setattr(impacts, "refine_band_power", refuse)
+    monkeypatch.setattr(impacts, "refine_from", refuse)
     monkeypatch.setattr(impacts, "weight_by_chance_variation", lambda problem, fit: replace(problem, spread=spread))
     with pytest.raises(RefinedError) if refined else contextlib.nullcontext():
         assert impacts.explain_impacts(*recorded, CATALOGUE) is None
 
 
 def test_play_is_not_refined_once_the_time_has_ended(recorded, monkeypatch):
-    monkeypatch.setattr(impacts, "refine_band_power", None)
+    monkeypatch.setattr(impacts, "refine_from", None)
     assert impacts.explain_impacts(*recorded, CATALOGUE, CountedBudget(0)) is None
 
 

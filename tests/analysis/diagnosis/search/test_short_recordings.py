@@ -10,9 +10,14 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.choose_measure import make_force_measure
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit
-from analysis.diagnosis.search import short_recordings
+from analysis.diagnosis.search import next_effect, short_recordings
+from analysis.diagnosis.search.next_effect import (
+    _fit_on_short_recordings,
+    _keep_promising,
+    _select_worth_continuing,
+)
 from analysis.diagnosis.search.screening import ScreenedHypothesis
-from analysis.diagnosis.search.short_recordings import _keep_promising, shorten_recordings
+from analysis.diagnosis.search.short_recordings import shorten_recordings
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -178,6 +183,38 @@ def test_laws_of_time_are_kept_by_the_share_that_they_promise_of_the_cost_there(
     screened = [ScreenedHypothesis(NO_EFFECTS, from_.cost * (1 - share)) for share in (0.4, 0.05)]
     assert _keep_promising((base, [law]), from_, screened) == screened[:1]
     assert _keep_promising((base, []), from_, screened) == screened
+
+
+def test_fits_are_continued_by_the_share_that_they_removed_of_the_cost_of_their_samples():
+    base, coarse_base = SimpleNamespace(cost=10.0), SimpleNamespace(cost=40.0)
+    weak, varying = ([SimpleNamespace(cost=cost) for cost in costs] for costs in ((9.5, 9.8, 9.9, 7.5), (12.0, 39.0)))
+    continued = _select_worth_continuing((base, weak), (coarse_base, varying))
+    assert continued == [varying[0], weak[3], weak[0], varying[1]]  # gains 0.7, 0.25, and two to make four
+    equal = [SimpleNamespace(cost=5.0 + index / 10) for index in range(9)]
+    assert _select_worth_continuing((base, equal), (coarse_base, varying)) == [varying[0], *equal]
+
+
+HUM = {"amplitude": 5.0, "frequency": 50.0, "phase": 0.0}
+
+
+def test_beside_friction_no_law_is_continued_that_removes_far_less_than_a_hum(make_context, monkeypatch):
+    rubbing = PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.1})
+    context = make_context((rubbing, PlacedEffect(EFFECTS["mains_hum"], (0,), HUM)))
+    base = evaluate_at_zero(context, make_hypothesis("coulomb_friction", level=0.1))
+    sizes = (0.01, 0.02, 0.03, 0.04, 0.05, 0.06)
+    laws = [make_hypothesis("viscous_damping", damping=size) for size in sizes]
+    fitted_counts, fit_first = [], next_effect.fit_first
+
+    def count_fits(*arguments):
+        fits = fit_first(*arguments)
+        fitted_counts.append(len(fits))
+        return fits
+
+    monkeypatch.setattr(next_effect, "fit_first", count_fits)
+    short = shorten_recordings(context, base)
+    fits = _fit_on_short_recordings(context, short, base, laws, [make_hypothesis("mains_hum", **HUM)])
+    assert fitted_counts == [4, 1]  # the least number of laws
+    assert len(fits) == 4 and fits[0].hypothesis.claims[-1].effect.name == "mains_hum"
 
 
 @pytest.fixture(scope="module")

@@ -67,6 +67,23 @@ def test_pseudo_thresholds_average_to_the_estimate():
     np.testing.assert_allclose(compute_pseudo_thresholds(fit).mean(axis=0), fit.means_db, atol=1e-9)
 
 
+def test_the_same_answers_at_all_frequencies_are_no_difference_to_test():
+    """Their pseudo-thresholds differ by the tolerance of the fit, 1e-8 dB, which a t test would take for an effect."""
+    level_db, run, is_correct, side = np.tile(np.linspace(-15, 8, 40), 9), np.repeat(np.arange(9), 40), [], []
+    for person in range(3):
+        random = np.random.default_rng([0, person])
+        share = 1 - 0.5 * np.exp(-(10 ** ((level_db[:40] + 6 - person) / 10)))
+        is_correct += 3 * [random.random(40) < share]
+        side += 3 * [np.where(random.random(40) < 0.5, 1.0, -1.0)]
+    answers = count_cells(
+        ("p0", "p1", "p2"), (10.0, 20.0, 30.0), run, level_db, np.concatenate(side), np.concatenate(is_correct)
+    )
+    assert 0 < np.abs(np.diff(compute_pseudo_thresholds(fit_hierarchy(answers)), axis=1)).max() < 1e-6
+    found = compute_primary_analysis(answers, 3.0, declared_hz=(20.0, 10.0))
+    assert (found.contrasts, found.declared_contrast, found.overall.p) == ((), None, None)
+    assert "change alike" in found.overall.notes[-1]
+
+
 @pytest.mark.slow
 def test_above_the_cap_there_is_a_bound_and_no_size():
     (study,) = simulate_studies(Crowd((5.0, 45.0), (0.5, 8.0)), 1)

@@ -14,7 +14,7 @@ from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.procedure.psi import compute_posterior, estimate_threshold
 from protocols.procedure.staircase import begin_staircase, is_finished, step, to_db
 from tests.analysis.conftest import PUBLISHED
-from tests.slow_instances import slow_after
+from tests.slow_instances import slow, slow_after
 
 PSI = replace(PUBLISHED, bayesian=BayesianPlacement(60))
 RULES = [
@@ -24,7 +24,7 @@ RULES = [
 ]
 
 
-@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("rule", [RULES[0], *slow(RULES[1]), RULES[2]])
 @pytest.mark.parametrize("threshold_n", slow_after(1, [0.2, 1.5, 30.0]))
 def test_levels_and_estimates_are_those_of_step(rule, threshold_n):
     cap_db = to_db(rule.cap_n)

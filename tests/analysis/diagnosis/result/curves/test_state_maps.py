@@ -94,9 +94,9 @@ def test_what_nothing_completes_has_no_second_course():
 def test_how_far_names_reach_is_measured_on_held_out_blocks(friction_maps):
     balance, _, recording = friction_maps
     (reached,) = collect_balance_errors(NOTHING, (balance,), recording.command.channels)
-    assert reached.named_error == pytest.approx(reached.linear)
+    assert reached.named_error == pytest.approx(reached.linear_error)
     assert reached.share == pytest.approx(0.0, abs=1e-6)
-    assert reached.ceiling < 0.3 * reached.linear
+    assert reached.all_laws_error < 0.3 * reached.linear_error
 
 
 def test_states_and_loops_are_drawn_with_plain_units(friction_maps):
@@ -136,11 +136,11 @@ def test_a_law_that_leaves_a_remainder_explains_less_than_all(friction_maps):
     level = {name: Estimate(value, "N") for name, value in weighed.values.items()}
     effect = NamedEffect(weighed.law.effect, "mechanism", "force", 0.9, 0.9, level)
     named = replace(NOTHING, verdict="partly_explained", effects=(effect,), remainder=(PLACE,))
-    half = replace(balance, laws=(replace(weighed, share=1.0),), linear=0.2, error=0.1, ceiling=0.1)
+    half = replace(balance, laws=(replace(weighed, share=1.0),), linear_error=0.2, error=0.1, all_laws_error=0.1)
     assert add_balances_with_fitted_model(named, (half,), recording.command.channels).effects[0].share == pytest.approx(
         0.75
     )
-    whole = replace(half, ceiling=0.0)
+    whole = replace(half, all_laws_error=0.0)
     assert add_balances_with_fitted_model(named, (whole,), recording.command.channels).effects[
         0
     ].share == pytest.approx(1.0)
