@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -17,6 +18,7 @@ from hypothesis import settings
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import load_protocol
 from tests.machine_pauses import PauseMeter
+from tests.small_protocols import BRIEF, SMALL
 
 # The same examples each time: what fails, fails on every machine. `--hypothesis-profile explore` draws new ones.
 # No deadline: a test that fails where the machine is busy says nothing about the code.
@@ -104,49 +106,21 @@ def pytest_runtest_call(item: pytest.Item) -> None:
         PAUSES.reset()
 
 
-SMALL = """
-name = "small"
-kind = "study"
-title = "A small study for tests"
-
-[stimulus]
-frequencies_hz = [25.0, 35.0]
-fade_in_s = 0.1
-fade_out_s = 0.05
-
-[staircase]
-start_n = 1.0
-cap_n = 3.0
-up_after_wrong = 1
-down_after_right = 3
-steps = [{ step_db = 4.0, reversals = 2 }, { step_db = 1.0, reversals = 3 }]
-reversals = 5
-averaged_reversals = 3
-
-[directions]
-
-[safety]
-stimulus_cap_n = 3.0
-total_cap_n = 4.5
-
-[training]
-frequencies_hz = [5.0]
-trial_limit = 4
-
-[trial]
-pause_between_s = 0.0
-
-[rests]
-after_run_s = 2.0
-
-[measurement]
-keep_s = 0.2
-"""
-
-
 @pytest.fixture(scope="session")
 def small_text() -> str:
     return SMALL
+
+
+@pytest.fixture(scope="session")
+def brief_text() -> str:
+    return BRIEF
+
+
+@pytest.fixture(scope="session")
+def brief_protocol() -> StudyProtocol:
+    protocol = load_protocol(BRIEF, "brief.toml")
+    assert isinstance(protocol, StudyProtocol)
+    return protocol
 
 
 @pytest.fixture(scope="session")
@@ -221,16 +195,27 @@ def validated_here(monkeypatch) -> None:
     monkeypatch.setattr(validate_in_process, "_start_worker", lambda: ThreadPoolExecutor(max_workers=1))
 
 
+@pytest.fixture(scope="session")
+def sketching() -> Callable[[], AbstractContextManager[None]]:
+    """`tests/sketches.py`, for fixtures of a module."""
+    return _sketching
+
+
+@contextmanager
+def _sketching() -> Iterator[None]:
+    from tests.sketches import list_replacements
+
+    with pytest.MonkeyPatch.context() as patched:
+        for replacement in list(list_replacements()):
+            patched.setattr(*replacement)
+        yield
+
+
 @pytest.fixture
-def sketched(monkeypatch) -> None:
-    """Each figure of a report is a line, where a test is about something else: to draw them is most of what it takes to
-    analyse a session. Fixtures of a module still draw."""
-
-    def sketch(picture) -> tuple[str, bytes]:
-        svg = f'<svg xmlns="http://www.w3.org/2000/svg" id="{picture.name}"><path d="M0 0L9 9"/></svg>'
-        return svg, b"a sketch" if picture.bitmap else b""
-
-    monkeypatch.setattr("study.workflows.picture_files._render_svg_and_png", sketch)
+def sketched() -> Iterator[None]:
+    """`tests/sketches.py`. Fixtures of a module still draw where they do not use `sketching`."""
+    with _sketching():
+        yield
 
 
 @pytest.fixture

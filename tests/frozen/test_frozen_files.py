@@ -15,6 +15,8 @@ from typer.testing import CliRunner
 from study.cli.main import app
 from study.workflows.files.validate import validate_file
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 FROZEN = Path(__file__).parent
 VERSIONS = sorted(folder for folder in FROZEN.iterdir() if folder.name.startswith("v"))
 SESSIONS = ("P01_001", "P03_001", "P04_001")

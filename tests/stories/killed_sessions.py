@@ -1,9 +1,9 @@
 """Run sessions, kill each with SIGKILL at random moments, resume it, and check what is on the disk.
 
-A script of its own: `python killed_sessions.py FOLDER SESSIONS SEED PROTOCOL [processes]`. Every sitting goes through
-the command line, `hapteq study` and `hapteq resume`, results included. It forks its children from a warm process
-without threads, so that a hundred sessions take minutes rather than hours; with `processes` each is a new program.
-Prints one JSON line per session.
+A script of its own: `python killed_sessions.py FOLDER SESSIONS SEED PROTOCOL [processes|sketched]`. Every sitting
+goes through the command line, `hapteq study` and `hapteq resume`, results included. It forks its children from a warm
+process without threads, so that a hundred sessions take minutes rather than hours; with `processes` each is a new
+program, and with `sketched` each figure of a report is a line. Prints one JSON line per session.
 """
 
 import json
@@ -19,10 +19,14 @@ from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import read_log
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
+from tests.sketches import list_replacements
 
 KILLS = 3
 RESULTS = Path(sys.argv[1]).with_name("results.jsonl")
 PROCESSES = sys.argv[5:] == ["processes"]
+if sys.argv[5:] == ["sketched"]:
+    for replacement in list(list_replacements()):
+        setattr(*replacement)
 
 
 def words(data: Path, subject: str, protocol: str, seed: int) -> list[str]:

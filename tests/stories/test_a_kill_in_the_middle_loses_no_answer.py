@@ -35,8 +35,8 @@ def check(results: list[dict], sessions: int) -> None:
         assert [r["session"] for r in results if not r[fact]] == [], fact
 
 
-def test_a_few_killed_sessions_finish_with_the_same_results(tmp_path, small_text):
-    results = run(tmp_path, 2, seed=5, text=small_text)
+def test_a_few_killed_sessions_finish_with_the_same_results(tmp_path, brief_text):
+    results = run(tmp_path, 2, 5, brief_text, "sketched")
     check(results, 2)
     assert sum(r["kills"] for r in results) >= 3
 

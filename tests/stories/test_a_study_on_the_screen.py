@@ -106,9 +106,8 @@ def headless(given: list[bool], text: str, data: Path):
 
 
 @pytest.mark.timeout(280)
-def test_from_the_start_to_the_report_with_a_kill_in_the_middle(at_the_screen, small_file, small_text, tmp_path):
-    text = small_text.replace("[25.0, 35.0]", "[25.0]")
-    small_file.write_text(text)
+def test_from_the_start_to_the_report_with_a_kill_in_the_middle(at_the_screen, small_file, brief_text, tmp_path):
+    small_file.write_text(brief_text)
     first = at_the_screen("study", "--protocol", str(small_file), "--seed", str(SEED))
     first.terminal.wait_for("New session")
     first.terminal.wait_for("A small study for tests")
@@ -137,7 +136,7 @@ def test_from_the_start_to_the_report_with_a_kill_in_the_middle(at_the_screen, s
     assert "Nothing was felt" in (session.path / "analysis" / "report.html").read_text()
 
     counted = [trial for trial in state.trials if trial.is_valid]
-    other = headless([bool(trial.correct) for trial in counted], text, tmp_path / "headless")
+    other = headless([bool(trial.correct) for trial in counted], brief_text, tmp_path / "headless")
 
     def levels(trials):
         return [(t.run, t.trial, t.phase, t.frequency_hz, t.level_n, t.correct, t.reversal) for t in trials]

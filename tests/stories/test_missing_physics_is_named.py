@@ -95,6 +95,7 @@ def test_without_the_true_effect_no_other_one_explains(short):
     assert all(effect.effect != "force_saturation" for effect in found.effects)
 
 
+@pytest.mark.slow
 def test_commands_in_another_order_explain_nothing(short):
     case = short(SEED, FRICTION)
     shuffled = np.random.default_rng(1).permutation(case.recording.command.samples)

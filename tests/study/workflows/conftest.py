@@ -1,6 +1,7 @@
 """A small session that a test can begin, leave and go on with, in virtual time."""
 
-from dataclasses import dataclass
+import shutil
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,37 @@ class SittingOptions:
 @pytest.fixture
 def sitter(tmp_path, small_protocol, small_text) -> SittingOptions:
     return SittingOptions(tmp_path / "data", small_protocol, small_text)
+
+
+@pytest.fixture
+def brief(tmp_path, brief_protocol, brief_text) -> SittingOptions:
+    """As `sitter`, with a third of the trials."""
+    return SittingOptions(tmp_path / "data", brief_protocol, brief_text)
+
+
+@pytest.fixture(scope="session")
+def played(tmp_path_factory, small_protocol, small_text) -> ConductedSitting:
+    return SittingOptions(tmp_path_factory.mktemp("played") / "data", small_protocol, small_text).whole()
+
+
+@pytest.fixture
+def finished(sitter, played) -> ConductedSitting:
+    """What `sitter.whole()` leaves: played once and copied, for tests of what a session is afterwards."""
+    shutil.copytree(played.folder.path.parent, sitter.data)
+    return replace(played, folder=SessionFolder(sitter.data / played.folder.name))
+
+
+@pytest.fixture(scope="session")
+def taken_data(tmp_path_factory, small_text, sketching) -> Path:
+    """A data folder with a finished and analysed session, P01_001; copied by tests that change it."""
+    from study.cli.main import main
+
+    folder = tmp_path_factory.mktemp("taken")
+    (folder / "small.toml").write_text(small_text)
+    asked = ["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", "3"]
+    with sketching():
+        assert main([*asked, "--subject", "P01", "--data", str(folder / "data")]) == 0
+    return folder / "data"
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ from study.tui.engine.from_engine import Failed, Finished
 from study.tui.engine.to_engine import BeginSession, SessionOrder
 from study.tui.home_messages import BeginRequested
 from study.tui.screens.confirm_view import VIEW_SHOWN_NOTE
+from tests.slow_instances import slow
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -177,7 +178,8 @@ def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_continues(sitting, log
     assert is_log_locked(log) is False
 
 
-def test_an_engine_that_dies_leaves_a_panel_and_a_way_on(sitting, log):
+@pytest.mark.parametrize("resumed", [False, *slow(True)])
+def test_an_engine_that_dies_leaves_a_panel_and_a_way_on(sitting, log, resumed):
     async def story(person: Person) -> None:
         await person.until("TrialScreen")
         await person.answer()
@@ -185,15 +187,16 @@ def test_an_engine_that_dies_leaves_a_panel_and_a_way_on(sitting, log):
         await person.until("OutcomeScreen")
         await person.reads("! The device program ended")
         await person.reads("Every answer that was given is on disk.")
-        await person.press("r")
-        await person.until("TrialScreen")
-        await person.press("ctrl+c")
-        await person.reads("! Interrupted")
+        if resumed:
+            await person.press("r")
+            await person.until("TrialScreen")
+            await person.press("ctrl+c")
+            await person.reads("! Interrupted")
         await person.press("q")
 
     app = sitting(story)
     assert isinstance(app.outcome, Failed)
-    assert app.outcome.error.saved == "1 answer is on disk."
+    assert app.outcome.error.saved == ("1 answer" if resumed else "Every answer that was given") + " is on disk."
 
 
 def test_an_event_loop_that_hangs_frees_the_hand(sitting, log):
@@ -237,7 +240,7 @@ def test_a_pause_a_note_and_the_watchers_view_in_one_terminal(sitting, log):
     assert "pause_taken" in log.read_text()
 
 
-@pytest.mark.parametrize("way", ["key", pytest.param("command", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("way", ["key", *slow("command")])
 def test_a_participant_does_not_open_the_experimenters_view_by_accident(sitting, log, way):
     async def story(person: Person) -> None:
         await person.until("TrialScreen")

@@ -9,7 +9,7 @@ from study.session.views.form_entry import apply_key, make_blank_entry, make_rep
 from study.session.views.form_views import Form, FormField, FormKind, FormReply
 from study.tui.screens.form import FormScreen
 from study.tui.widgets.choice_row import ChoiceRow
-from tests.slow_instances import slow_after
+from tests.slow_instances import slow, slow_after
 
 YES_NO = ("yes", "no")
 HEARING = ("ear plugs", "ear muffs", "masking noise", "plugs and noise", "nothing that covers it")
@@ -190,7 +190,7 @@ def test_a_key_without_a_meaning_where_it_was_typed_means_nothing_later(on_stage
     on_stage(FormScreen(EXCLUSION), story)
 
 
-@pytest.mark.parametrize("form", [EXCLUSION, MIXED], ids=["choices", "mixed"])
+@pytest.mark.parametrize("form", [*slow(EXCLUSION), MIXED], ids=["choices", "mixed"])
 @pytest.mark.parametrize("seed", slow_after(1, range(2)))
 def test_any_burst_fills_in_what_the_same_keys_fill_in_one_by_one(on_stage, form, seed):
     follow_bursts(on_stage, form, seed, BURSTS)

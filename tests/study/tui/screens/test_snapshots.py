@@ -36,7 +36,7 @@ from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.practice_over import PracticeOverScreen
 from study.tui.screens.rest import RestScreen
 from study.tui.screens.trial import TrialScreen
-from tests.slow_instances import slow
+from tests.slow_instances import slow, slow_rows
 
 SIZES = ((80, 24), (132, 40))
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
@@ -102,10 +102,23 @@ SCREENS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-@pytest.mark.parametrize("name", SCREENS)
-def test_a_screen_reads_as_it_did(on_stage, same_as_before, name, size):
+NARROW, WIDE = SIZES
+LAID_OUT_BY_WIDTH = ("trial", "form_consent", "instructions", "rest")
+"""At the larger size too, in the quick tests."""
+
+
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        *((name, NARROW) for name in SCREENS),
+        *((name, WIDE) for name in LAID_OUT_BY_WIDTH),
+        *slow_rows(*((name, WIDE) for name in SCREENS if name not in LAID_OUT_BY_WIDTH)),
+    ],
+    ids=lambda each: each if isinstance(each, str) else f"{each[0]}x{each[1]}",
+)
+def test_a_screen_reads_as_it_did_and_tells_of_its_help(on_stage, same_as_before, name, size):
     async def story(stage):
+        assert "Help" in stage.text.splitlines()[-1]
         same_as_before(f"{name}_{size[0]}x{size[1]}.txt", stage.text)
 
     on_stage(SCREENS[name](), story, size)
@@ -121,18 +134,24 @@ def test_the_trial_looks_as_it_did(on_stage, same_as_before, size, theme):
 
 
 @pytest.mark.parametrize("name", SCREENS)
-def test_every_screen_has_help_and_tells_its_keys(on_stage, name):
+def test_every_screen_has_help(name):
     screen = SCREENS[name]()
     assert 3 <= len([line for line in screen.HELP.splitlines() if line.startswith("- ")]) <= 8
 
-    async def story(stage):
-        assert "Help" in stage.text.splitlines()[-1]
 
-    on_stage(screen, story)
+TINY, HUGE = (40, 12), (200, 60)
 
 
-@pytest.mark.parametrize("size", [(40, 12), (200, 60)], ids=["tiny", "huge"])
-@pytest.mark.parametrize("name", ["trial", "trial_interval", "handle", "form_consent"])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("trial", TINY), ("handle", HUGE), ("form_consent", TINY),
+        *slow_rows(
+            ("trial", HUGE), ("handle", TINY), ("form_consent", HUGE),
+            ("trial_interval", TINY), ("trial_interval", HUGE),
+        ),
+    ],
+)  # fmt: skip
 def test_a_screen_survives_any_size_and_a_resize(on_stage, name, size):
     async def story(stage):
         await stage.pilot.resize_terminal(*size)

@@ -6,6 +6,7 @@ The oracle is the table itself: a table that notes what was asked of it says wha
 import re
 import tomllib
 from dataclasses import replace
+from functools import cache
 from importlib.resources import files
 
 import pytest
@@ -51,12 +52,21 @@ from study.tui.screens.practice_over import PracticeOverScreen
 from study.tui.screens.preparing import PreparingScreen
 from study.tui.screens.rest import RestScreen
 from study.tui.screens.trial import TrialScreen
-from tests.slow_instances import slow_after
+from tests.slow_instances import slow_after, slow_rows
 from tests.study.tui.screens.test_snapshots import INTERVAL, PICTURE, QUESTION
 
 LANGUAGES = ("de", "es")
+
+
+def in_turn(values) -> list:
+    """Rows of a value and a language: of each value a language in turn; the others have the marker `slow`."""
+    turns = (LANGUAGES, LANGUAGES[::-1])
+    rows = [[(value, code) for code in turns[number % 2]] for number, value in enumerate(values)]
+    return [each for quick, *others in rows for each in (quick, *slow_rows(*others))]
+
+
 SHOWN_LATER = ("help_", "form_more", "key_")
-"""Pages of their own; and the footer, which has a test of its own."""
+"""Pages of their own; and the footer, see `check_footer`."""
 
 
 class Noting(dict):
@@ -71,6 +81,7 @@ class Noting(dict):
         return super().get(key, default)
 
 
+@cache
 def table_of(code):
     return tomllib.loads(files("protocols").joinpath("wording", f"{code}.toml").read_text("utf-8"))
 
@@ -130,8 +141,7 @@ def english_in(words, table):
     return [part for part in ENGLISH_PARTS if part in words and part not in own]
 
 
-@pytest.mark.parametrize("code", LANGUAGES)
-@pytest.mark.parametrize("name", SCREENS)
+@pytest.mark.parametrize(("name", "code"), in_turn(SCREENS))
 def test_a_screen_says_all_of_it_and_nothing_in_english(on_stage, name, code):
     table = table_of(code)
     noting = Noting(table)
@@ -144,12 +154,22 @@ def test_a_screen_says_all_of_it_and_nothing_in_english(on_stage, name, code):
         assert asked
         cut = [(key, part) for key in asked for part in parts(table[key]) if part not in words]
         assert cut == [], stage.text
+        check_footer(screen, stage, table)
 
     on_stage(screen, story)
 
 
-@pytest.mark.parametrize("code", LANGUAGES)
-@pytest.mark.parametrize("plane", ["yz", "zx", "xy"])
+def check_footer(screen, stage, table):
+    """It fits and is not English."""
+    footer = stage.text.splitlines()[-1]
+    shown = [active.binding for active in screen.active_bindings.values() if active.binding.show]
+    assert [b.description for b in shown if b.description and b.description not in footer] == []
+    english = {ENGLISH[key]: text for key, text in table.items() if key.startswith("key_")}
+    left = {b.description for b in shown} & {word for word, text in english.items() if word != text}
+    assert left - {text for text in english.values()} == set()
+
+
+@pytest.mark.parametrize(("plane", "code"), in_turn(["yz", "zx", "xy"]))
 def test_directions_are_told_to_the_last_word(on_stage, plane, code):
     words = Words(table_of(code))
     picture = DirectionPicture(plane, (135.0, 45.0))
@@ -163,7 +183,7 @@ def test_directions_are_told_to_the_last_word(on_stage, plane, code):
     on_stage(armed(words, replace(QUESTION, picture=picture)), story)
 
 
-@pytest.mark.parametrize("code", LANGUAGES)
+@pytest.mark.parametrize("code", slow_after(1, LANGUAGES))
 def test_what_a_stop_tells_is_in_the_language(on_stage, code):
     words = Words(table_of(code))
 
@@ -179,24 +199,7 @@ def test_what_a_stop_tells_is_in_the_language(on_stage, code):
     on_stage(OutcomeScreen(outcomes.make_stop_sent_outcome(words)), story)
 
 
-@pytest.mark.parametrize("code", LANGUAGES)
-@pytest.mark.parametrize("name", SCREENS)
-def test_a_footer_fits_and_is_not_english(on_stage, name, code):
-    screen = SCREENS[name](Words(table_of(code)))
-
-    async def story(stage):
-        footer = stage.text.splitlines()[-1]
-        shown = [active.binding for active in screen.active_bindings.values() if active.binding.show]
-        assert [b.description for b in shown if b.description and b.description not in footer] == []
-        english = {ENGLISH[key]: text for key, text in table_of(code).items() if key.startswith("key_")}
-        left = {b.description for b in shown} & {word for word, text in english.items() if word != text}
-        assert left - {text for text in english.values()} == set()
-
-    on_stage(screen, story)
-
-
-@pytest.mark.parametrize("code", slow_after(1, LANGUAGES))
-@pytest.mark.parametrize("kind", [kind for kind in FormKind if kind is not FormKind.HANDLE])
+@pytest.mark.parametrize(("kind", "code"), in_turn([kind for kind in FormKind if kind is not FormKind.HANDLE]))
 def test_a_form_is_in_the_language_from_top_to_bottom(on_stage, kind, code):
     table = table_of(code)
     before = [
@@ -218,7 +221,7 @@ def test_a_form_is_in_the_language_from_top_to_bottom(on_stage, kind, code):
     on_stage(FormScreen(form, Words(table)), story)
 
 
-@pytest.mark.parametrize("code", LANGUAGES)
+@pytest.mark.parametrize("code", slow_after(1, LANGUAGES))
 def test_help_is_in_the_language_too(on_stage, code):
     table = table_of(code)
     screen = RestScreen(RestNotice(75.0, 3), Words(table))
@@ -232,8 +235,7 @@ def test_help_is_in_the_language_too(on_stage, code):
     on_stage(HelpScreen(screen.HELP, Words(table)), story)
 
 
-@pytest.mark.parametrize("size", [(80, 24), (60, 20)])
-@pytest.mark.parametrize("code", LANGUAGES)
+@pytest.mark.parametrize(("size", "code"), in_turn([(80, 24), (60, 20)]))
 def test_why_a_note_is_refused_is_shown_to_its_last_word(on_stage, code, size):
     words = Words(table_of(code))
 
@@ -244,7 +246,7 @@ def test_why_a_note_is_refused_is_shown_to_its_last_word(on_stage, code, size):
     on_stage(NoteScreen(adverse=True, words=words), story, size)
 
 
-@pytest.mark.parametrize("code", LANGUAGES)
+@pytest.mark.parametrize("code", slow_after(1, LANGUAGES))
 def test_the_word_that_confirms_a_withdrawal_is_that_of_the_language(on_stage, code):
     word = table_of(code)["withdraw_word"]
 

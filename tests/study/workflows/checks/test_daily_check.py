@@ -71,6 +71,14 @@ def test_what_was_measured_too_inaccurately_is_neither_changed_nor_fine():
     assert found.warning and not found.fine and "close other programs" in found.advice
 
 
+@pytest.mark.parametrize(("difference", "may_be_reversed"), [(2.0, True), (0.5, False)])
+def test_a_reversed_axis_of_the_sensor_is_named_beside_loose_screws(difference, may_be_reversed):
+    """Its response differs by twice itself; the advice was to look for a loose screw, or to accept the device anew."""
+    (found,) = make_change_findings([change("response", accepted=0.0, today=difference, changed=True)])
+    assert ("reversed or exchanged axis of the sensor" in found.advice) is may_be_reversed
+    assert "loose screw" in found.advice
+
+
 def test_a_handle_that_does_not_move_any_more_has_changed():
     (found,) = make_change_findings([change("friction", today=np.nan, unit="N", changed=True)])
     assert "the handle did not move" in found.value and found.wrong
@@ -166,6 +174,7 @@ def test_from_the_acceptance_to_the_first_day_at_the_command_line(device_like, m
         return "signed"
 
     monkeypatch.setattr(examine_setup, "examine_setup", fine_setup)
+    monkeypatch.setattr(examine_setup, "require_testable_device", lambda *_: None)
     monkeypatch.setattr(examine_setup, "accept_device", sign)
     monkeypatch.setattr(daily_check, "_open_free_device", opened)
     monkeypatch.setattr(daily_check, "_read_protocol", short)

@@ -13,6 +13,7 @@ from analysis.device_change.measure_device import measure_device
 from equalizer.signals.recording import Recording
 from study.cli.main import main
 from study.devices.opening import get_device_folder
+from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.errors import DeviceError
 from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.store.disk.file_errors import UnusableFileError
@@ -37,6 +38,7 @@ def test_the_proof_of_the_acceptance_is_announced_and_a_no_keeps_the_device_stil
         notices.append(notice)
         raise KeyboardInterrupt
 
+    monkeypatch.setattr(examine_setup, "require_testable_device", lambda *_: None)
     monkeypatch.setattr(examine_setup, "record_baseline", lambda *_: ("baselines/a.h5", "0"))
     monkeypatch.setattr(examine_setup, "accept_device", lambda *_: called.append("moved"))
     with pytest.raises(KeyboardInterrupt):
@@ -45,11 +47,24 @@ def test_the_proof_of_the_acceptance_is_announced_and_a_no_keeps_the_device_stil
     assert "No person may hold the handle" in notices[0] and "0.5 N" in notices[0]
 
 
+def test_a_driver_that_cannot_be_tested_is_refused_before_the_device_moves(monkeypatch):
+    """A laboratory's own driver without the methods of the test; its handle moved for a minute and a half before."""
+    moved = []
+    rig = SimpleNamespace(close=lambda: None)
+    monkeypatch.setitem(RIGS_BY_NAME, "own", lambda settings, seed: rig)
+    monkeypatch.setattr(examine_setup, "record_baseline", lambda *_: moved.append("baseline") or ("a.h5", "0"))
+    looked = Examination((), DeviceReport("own", simulated=False, findings=()), SimpleNamespace(findings=()))
+    with pytest.raises(DeviceError, match="its driver has no read_reported_n"):
+        accept_examined_device("own", looked, "Ada", QUIET)
+    assert not moved
+
+
 @pytest.mark.parametrize("sensor", [True, False])
 def test_a_sensor_that_is_not_fine_does_not_hinder_the_acceptance(monkeypatch, sensor):
     asked = []
     found = (DeviceFinding("Accelerometer", "", fine=sensor),)
     looked = Examination((), DeviceReport("omega3", simulated=False, findings=found), SimpleNamespace(findings=()))
+    monkeypatch.setattr(examine_setup, "require_testable_device", lambda *_: None)
     monkeypatch.setattr(examine_setup, "record_baseline", lambda *_: ("baselines/a.h5", "0"))
     monkeypatch.setattr(examine_setup, "accept_device", lambda _, settings, *rest: asked.append(settings) or "signed")
     said = accept_examined_device("omega3", looked, "Ada", QUIET)

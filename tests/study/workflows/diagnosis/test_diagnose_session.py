@@ -25,20 +25,24 @@ SPRING = pytest.approx(136.5, abs=0.5)
 
 
 @pytest.fixture(scope="module")
-def session(tmp_path_factory, small_text) -> Path:
+def session(tmp_path_factory, brief_text) -> Path:
     plan = SessionPlan(
-        protocol=load_protocol(small_text, "small.toml"), protocol_text=small_text, protocol_locked=False,
+        protocol=load_protocol(brief_text, "brief.toml"), protocol_text=brief_text, protocol_locked=False,
         subject="P01", observer="ideal", seed=3, data_folder=tmp_path_factory.mktemp("data"), participant_number=0,
     )  # fmt: skip
     return conduct_new(plan, "simulated", make_simulated_participant("ideal", 3, VirtualClock())).folder.path
 
 
-def test_the_spring_is_in_the_compared_model_and_not_in_the_improved_one(session, diagnosed, tmp_path):
+@pytest.fixture(scope="module")
+def findings(diagnosed):
+    return diagnosed.diagnosed(diagnosed.recorded(1), diagnosed.device(1))
+
+
+def test_the_spring_is_in_the_compared_model_and_not_in_the_improved_one(session, findings, tmp_path):
     one = np.eye(3)
     write_mechanical_model(
         tmp_path / "m.toml", MechanicalModel("handle", "acceleration", 0.3 * one, 8 * one, 20 * one, one, one)
     )
-    findings = diagnosed.diagnosed(diagnosed.recorded(1), diagnosed.device(1))
     compared = []
 
     def engine(recordings, model, settings, map_, progress):
@@ -55,13 +59,12 @@ def test_the_spring_is_in_the_compared_model_and_not_in_the_improved_one(session
     assert any("spring of 137 N/m held the handle" in remark for remark in done.findings.remarks)
 
 
-def test_a_diagnosis_that_was_under_way_during_a_withdrawal_leaves_nothing(session, diagnosed, tmp_path):
+def test_a_diagnosis_that_was_under_way_during_a_withdrawal_leaves_nothing(session, findings, tmp_path):
     data, one = tmp_path / "data", np.eye(3)
     shutil.copytree(session, data / session.name)
     write_mechanical_model(
         tmp_path / "m.toml", MechanicalModel("handle", "acceleration", 0.3 * one, 8 * one, 20 * one, one, one)
     )
-    findings = diagnosed.diagnosed(diagnosed.recorded(1), diagnosed.device(1))
 
     def withdraw_meanwhile(recordings, model, settings, map_, progress):
         SessionFolder(data / session.name).withdrawal.write_text("{}")

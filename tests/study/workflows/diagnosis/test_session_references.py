@@ -42,5 +42,5 @@ def test_a_reference_that_was_changed_since_is_left_out_and_the_trials_are_read(
     assert not any("trials were left out" in remark for remark in found.remarks)
 
 
-def test_a_session_without_probes_has_no_references(sitter):
-    assert find_references(sitter.whole().folder.path) is None
+def test_a_session_without_probes_has_no_references(finished):
+    assert find_references(finished.folder.path) is None

@@ -9,7 +9,7 @@ import pytest
 from study.cli.main import main
 from study.errors import ExitCode, StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
-from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
+from study.workflows.diagnosis.write_twin import TwinPlan, _fit_models, write_twin
 
 pytestmark = pytest.mark.usefixtures("validated_here")
 
@@ -145,3 +145,12 @@ def test_the_command_writes_a_model_and_says_what_it_is(tmp_path, capsys):
     assert main(arguments) == ExitCode.ERROR
     assert "never overwritten" in capsys.readouterr().err
     assert main(["validate", str(out)]) == ExitCode.DONE
+
+
+def test_a_fit_that_breaks_down_is_refused_as_any_other(monkeypatch, tmp_path):
+    def break_down(*_):
+        raise np.linalg.LinAlgError("Eigenvalues did not converge")
+
+    monkeypatch.setattr("study.workflows.diagnosis.write_twin.fit_mechanical_model", break_down)
+    with pytest.raises(StudyError, match="Eigenvalues did not converge"):
+        _fit_models(TwinPlan(tmp_path / "m.toml"), None, None, lambda _: None)

@@ -14,6 +14,7 @@ from study.store.formats.recording_file import write_recording
 from study.workflows.equalizer.identified_summary import format_summary, summarise_model
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.equalizer.report_identification import report_identification
+from tests.slow_instances import slow
 
 RATE_HZ = 1000.0
 
@@ -105,7 +106,7 @@ def test_the_page_shows_transfer_functions_bands_and_the_choice_of_order(device,
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("outputs", [1, 2])
+@pytest.mark.parametrize("outputs", [*slow(1), 2])
 def test_a_page_of_a_device_whose_coupling_cannot_be_judged_says_why(plants, tmp_path, outputs):
     """Two outputs of a single force have no coupling; at 60 Hz the direction limit of 35 Hz was not measured."""
     wave = np.tile(plants.sweep(4.5, 25.0, seconds=10.0), 2)[:, None]
@@ -153,7 +154,7 @@ def test_recordings_of_two_places_are_no_model_of_one(folder, plants, tmp_path):
     assert "different places; identify one model per place" in said.happened
 
 
-@pytest.mark.parametrize("place_m", [[0.0, 0.1], {"x": 0.0}, [0.0, 0.0, "left"], [[0.0, 0.0, 0.0]]])
+@pytest.mark.parametrize("place_m", [*slow([0.0, 0.1], {"x": 0.0}), [0.0, 0.0, "left"], *slow([[0.0, 0.0, 0.0]])])
 def test_a_place_that_is_none_is_named(plants, tmp_path, place_m):
     commands = np.tile(plants.multisine(4.5, 37.0, seconds=2.0), (2, 1))
     for number in range(3):

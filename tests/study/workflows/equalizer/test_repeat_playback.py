@@ -6,29 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
-from equalizer.identification.state_space.identify import identify
-from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.iteration import Verdict, rms
 from equalizer.tracking.learning.model_inverse import make_inverse_operator
-from protocols.definition.apparatus import SafetySettings
-from protocols.definition.recording_protocol import RecordingProtocol
-from protocols.definition.recording_segments import SweepSegment
 from study.devices.device import DeviceSettings
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.store.disk.file_errors import UnusableFileError
-from study.store.formats.recording_file import read_recording
 from study.store.formats.repeats_file import get_repeats_path, read_repeats
 from study.store.formats.trajectory_file import read_trajectory
 from study.workflows.equalizer.repeat_playback import repeat_playback
 from study.workflows.equalizer.repeat_results import RepeatPlan, read_earlier_forces
 from study.workflows.files.validate import validate_file
-from study.workflows.recording.record_device import RecordingPlan, record_device
 from tests.slow_instances import slow
 
 BAND_HZ = (5.0, 35.0)
@@ -53,17 +45,8 @@ def trajectory(level=1.8, rows=2000) -> Trajectory:
 
 
 @pytest.fixture(scope="module")
-def inverse(tmp_path_factory):
-    """Of a model from sweeps of the band, as a lab would make it."""
-    sweeps = tuple(SweepSegment("sweep", 4.5, 37.0, 2.0, axis, duration_s=15.0, periods=2) for axis in ("x", "y", "z"))
-    safety = SafetySettings(stimulus_cap_n=3.0, total_cap_n=4.5)
-    protocol = RecordingProtocol(
-        name="band", kind="recording", title="Band", segments=sweeps, safety=safety, rest_s=0.5
-    )
-    out = tmp_path_factory.mktemp("model") / "band.h5"
-    record_device(RecordingPlan(protocol, "simulated", (0.0, 0.0, 0.0), seed=3, out=out), lambda _: None)
-    settings = IdentificationSettings(draws=0, longer_horizons=(0,), record_horizons=())
-    return make_inverse_operator(identify(estimate_transfer([read_recording(out)]), settings).model)
+def inverse(lab_model):
+    return make_inverse_operator(lab_model)
 
 
 @pytest.fixture

@@ -46,5 +46,18 @@ def test_the_example_aligns_two_loggers_and_reports_it(tmp_path, velocity_mm_per
     assert done.recording.position is not None
 
 
+def test_a_table_with_the_headers_of_the_page_needs_no_map(tmp_path):
+    """It named x_mm, whose unit is not sure."""
+    (headers,) = re.findall(r"# header with units: (.*)", PAGE)
+    for number, header in enumerate(headers.split("; ")):
+        header = f"{header},ax [g]"  # the first example has no response
+        times_s = np.arange(200) / 1000
+        columns = [times_s, *(np.sin(factor * times_s) for factor in range(9, 9 + header.count(",")))]
+        write(tmp_path / f"{number}.csv", header, columns)
+        done = import_recording(ImportPlan((tmp_path / f"{number}.csv",), None, tmp_path / f"{number}.h5"))
+        assert done.map == "header" and len(done.recording) == 200
+    assert number == 1
+
+
 def test_every_shipped_map_is_on_the_page():
     assert all(f"| `{name}` |" in PAGE for name in list_shipped_maps())

@@ -7,6 +7,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
+from study.store.disk.file_errors import CannotReadError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.recording.import_recording import ImportPlan, import_recording, read_foreign
 from study.workflows.recording.read_any_recording import read_any_recording
@@ -130,13 +131,14 @@ def test_of_recordings_put_one_after_another_it_is_said_which_signals_were_left_
     force = Signal(np.ones((8, 1)), 1000.0, "force", "N", ("fx",))
     response = Signal(np.ones((8, 1)), 1000.0, "acceleration", "m/s^2", ("ax",))
     position = Signal(np.zeros((8, 1)), 1000.0, "position", "m", ("x",))
-    write_recording(tmp_path / "a.h5", Recording("rig", force, response, position=position))
+    for name in ("a.h5", "c.h5"):
+        write_recording(tmp_path / name, Recording("rig", force, response, position=position))
     write_recording(tmp_path / "b.h5", Recording("rig", force, response))
     files = (tmp_path / "a.h5", tmp_path / "b.h5")
     done = import_recording(ImportPlan(files, None, tmp_path / "r.h5"))
     assert done.recording.position is None
     assert done.notes[-1] == "Left out, because not every recording has it: position."
-    whole = import_recording(ImportPlan((tmp_path / "a.h5", tmp_path / "a.h5"), None, tmp_path / "s.h5"))
+    whole = import_recording(ImportPlan((tmp_path / "a.h5", tmp_path / "c.h5"), None, tmp_path / "s.h5"))
     assert not any("Left out" in note for note in whole.notes)
 
 
@@ -228,6 +230,26 @@ def test_tables_whose_command_repeats_get_segments_with_period_and_level(tmp_pat
 def test_without_a_file_nothing_is_imported(tmp_path, map_name):
     with pytest.raises(WrongUseError, match="No file was given"):
         import_recording(ImportPlan((), map_name, tmp_path / "r.h5"))
+
+
+def test_a_file_that_is_given_twice_is_refused(tmp_path):
+    """Also by another path, and by its folder and its name: its samples would count twice."""
+    table, matlab, map_path = tmp_path / "a.csv", tmp_path / "a.mat", tmp_path / "m.toml"
+    table.write_text(TABLE)
+    savemat(matlab, {"data": {"u": T, "y": T, "fs": 1000.0}})
+    map_path.write_text('files = ["a.mat"]\n' + MAP)
+    for files, map_name in (
+        ((table, tmp_path / "." / ".." / tmp_path.name / "a.csv"), None),
+        ((tmp_path, matlab), map_path),
+    ):
+        with pytest.raises(WrongUseError, match="A file is given twice"):
+            read_foreign(files, None if map_name is None else str(map_name))
+
+
+def test_a_link_to_itself_is_a_file_that_cannot_be_read(tmp_path):
+    (tmp_path / "a.csv").symlink_to(tmp_path / "a.csv")
+    with pytest.raises(CannotReadError):
+        read_foreign((tmp_path / "a.csv",), None)
 
 
 def test_hidden_files_of_a_folder_are_no_recordings(tmp_path):

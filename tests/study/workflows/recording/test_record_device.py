@@ -11,8 +11,10 @@ import study.workflows.recording.record_device as record_device_module
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import SineSegment, SweepSegment
-from study.errors import StudyError, UserInterruptError
-from study.store.disk.file_errors import CannotWriteError
+from study.devices.device import Fault
+from study.devices.safe import SafeDevice
+from study.errors import DeviceError, StudyError, UserInterruptError
+from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
@@ -77,6 +79,33 @@ def test_interrupted_at_once_nothing_is_written(tmp_path):
         record_device(plan(tmp_path / "r.h5"), press)
     assert left.value.saved == "Nothing was written."
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_another_program_made_meanwhile_costs_no_recording(tmp_path):
+    """Neither that file nor the recording, which was lost."""
+    out, free = tmp_path / "r.h5", tmp_path / "r_3.h5"
+    (tmp_path / "r_2.h5").write_text("an older one")
+    with pytest.raises(AlreadyExistsError) as told:
+        record_device(plan(out), lambda _: out.write_text("another"))
+    assert told.value.saved == f"The file is as it was; the recording is in {free}."
+    assert out.read_text() == "another"
+    assert len(read_recording(free).segments) == 3
+
+
+def test_an_error_of_the_writing_does_not_hide_that_the_force_may_still_be_on(tmp_path, monkeypatch):
+    """After an interruption, with a file of that name made meanwhile."""
+    out = tmp_path / "r.h5"
+
+    def press(seconds: float) -> None:
+        if seconds > 3.5:
+            out.write_text("another")
+            monkeypatch.setattr(SafeDevice, "fault", lambda self: Fault.FORCE_LEFT)
+            raise KeyboardInterrupt
+
+    with pytest.raises(DeviceError, match="The force may still be on") as told:
+        record_device(plan(out), press)
+    assert told.value.saved.endswith(f"the recording is in {tmp_path / 'r_2.h5'}.")
+    assert len(read_recording(tmp_path / "r_2.h5").segments) == 1
 
 
 def test_a_folder_that_does_not_exist_is_reported_before_anything_moves(tmp_path):

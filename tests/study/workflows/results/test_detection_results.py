@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from protocols.document.loading import load_protocol
@@ -29,13 +30,14 @@ gap_s = 0.2
 
 
 @pytest.fixture(scope="module")
-def taken(tmp_path_factory, sitter_of, small_text):
+def taken(tmp_path_factory, sitter_of, small_text, sketching):
     """One finished session and its results; copied by tests that change it."""
     text = small_text + BESIDE
     sitter = sitter_of(tmp_path_factory.mktemp("beside") / "data", load_protocol(text, "beside.toml"), text)
     sitter.observer = "ideal"
     done = sitter.whole()
-    return done.folder.path, write_results(done.folder)
+    with sketching():
+        return done.folder.path, write_results(done.folder)
 
 
 @pytest.fixture
@@ -110,6 +112,17 @@ def test_the_report_of_an_earlier_analysis_goes_first(session, monkeypatch):
 
 def test_a_withdrawal_takes_the_detection_table_of_an_analysis_too(session):
     assert session / "analysis" / "detection.csv" in list_analysis_outputs(session / "analysis")
+
+
+def test_an_error_of_the_program_is_not_called_one_of_the_data(session, tmp_path, monkeypatch):
+    """NumPy's LinAlgError is a ValueError, too."""
+
+    def break_down(*_):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("study.workflows.results.analyze_data.analyse_study", break_down)
+    with pytest.raises(np.linalg.LinAlgError):
+        analyze_data(session, tmp_path / "out")
 
 
 def test_an_analysis_is_not_written_over_the_tables_of_a_session(session):

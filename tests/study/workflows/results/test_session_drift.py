@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from analysis.device_change.probe_drift import Drift
 from protocols.definition.probes import ProbeSettings
 from protocols.document.dumping import dump_protocol
 from study.devices.safe import SafeDevice
@@ -13,7 +14,7 @@ from study.session.watching.followed_session import PlayedProbe
 from study.store.sessions.archive import SessionFolder
 from study.tui.watch.watch_lines import format_view
 from study.workflows.results import session_drift
-from study.workflows.results.session_drift import DriftReader
+from study.workflows.results.session_drift import DriftReader, describe_drift
 from study.workflows.views.watch_session import follow
 
 AFTER = 7
@@ -80,8 +81,8 @@ def test_a_session_without_probes_says_nothing_of_them(sitter):
     assert not any(line.startswith("Drift") for line in format_view(view))
 
 
-def test_a_recording_that_is_gone_is_left_out(sitter):
-    folder = sitter.whole().folder
+def test_a_recording_that_is_gone_is_left_out(finished):
+    folder = finished.folder
     lost = PlayedProbe(0, "hand", 0.2, 1.0, 0, "recordings/probe-000.h5")
     assert DriftReader(folder).update((lost, replace(lost, number=1, recording=""))) == ()
 
@@ -119,3 +120,11 @@ def test_references_of_another_sample_rate_are_not_compared(monkeypatch):
     first, other, last = (PlayedProbe(number, "reference", 0.4, 60.0 * number, number) for number in range(3))
     DriftReader(SessionFolder(Path("P01_001"))).update((first, other, last))
     assert compared == [(first, first, last)]
+
+
+def test_a_reversed_axis_of_the_accelerometer_is_said_to_be_reversed():
+    """The gain fell from 1 to -1."""
+    drift = Drift("gain", "gain", "x", 180.0, change=-2.0, error=0.01, initial_value=None)
+    text = describe_drift(drift)
+    assert text == "gain along x -200 % (reversed sign: of the force, or of this axis of the accelerometer) at minute 3"
+    assert describe_drift(replace(drift, change=-0.9)) == "gain along x -90 % at minute 3"

@@ -102,8 +102,8 @@ def test_a_participant_reads_that_the_sensor_was_not_heard(small_protocol):
     assert describe_void_trial(reason).startswith("The sensor at the handle gave too few readings")
 
 
-def test_the_counts_stand_beside_each_trial_and_in_its_recording(sitter, heard):
-    done = sitter.whole()
+def test_the_counts_stand_beside_each_trial_and_in_its_recording(brief, heard):
+    done = brief.whole()
     rows = {(row.lost_packets, row.garbled_bytes, row.acceleration_missing) for row in done.state.trials}
     assert rows == {(100, 1500, 0.01)}
     measured = [event for event in read_log(done.folder.log).events if event.event == "trial_measured"]
@@ -145,10 +145,10 @@ def test_such_a_protocol_begins_nothing_where_there_is_no_accelerometer(sitter, 
 
 
 @pytest.mark.parametrize(("share", "flagged"), [(0.0, True), (0.02, True), (0.3, False), (1.0, False)])
-def test_a_strong_stimulus_of_which_nothing_arrives_is_flagged_and_its_answer_counts(sitter, dead, share, flagged):
+def test_a_strong_stimulus_of_which_nothing_arrives_is_flagged_and_its_answer_counts(brief, dead, share, flagged):
     """A device that answers that all is well and does not move, or a sensor that is dead."""
     dead[0] = share
-    done = sitter.whole()
+    done = brief.whole()
     rows = [row for row in done.state.trials if row.is_valid and row.delivered_mps2 is not None]
     measured = [event for event in read_log(done.folder.log).events if event.event == "trial_measured"]
     said = {

@@ -40,11 +40,11 @@ class LateScreen:
 
 
 @pytest.fixture
-def late_at(sitter):
+def late_at(brief):
     def conducted(*questions: int):
-        seat = sitter.participant()
+        seat = brief.participant()
         screen = LateScreen(seat.display, questions)
-        return conduct_new(sitter.plan(), "simulated", Participant(screen, seat.hand, seat.clock)), screen
+        return conduct_new(brief.plan(), "simulated", Participant(screen, seat.hand, seat.clock)), screen
 
     return conducted
 

@@ -100,8 +100,8 @@ def test_a_clock_set_back_between_sittings_is_reported_when_the_session_continue
     assert again.state.sitting.sitting_elapsed_s >= 0.0
 
 
-def test_every_entry_of_a_sitting_carries_the_monotonic_clock(sitter):
-    events = read_log(sitter.whole().folder.log).events
+def test_every_entry_of_a_sitting_carries_the_monotonic_clock(finished):
+    events = read_log(finished.folder.log).events
     stamps = [event.monotonic_s for event in events]
     assert None not in stamps
     assert stamps == sorted(stamps)

@@ -23,24 +23,24 @@ def decisions(state):
     return [(t.run, t.trial, t.frequency_hz, t.level_n, t.correct) for t in state.trials if t.is_valid]
 
 
-def test_a_session_runs_to_its_end_and_its_log_folds_to_the_same_state(sitter):
-    done = sitter.whole()
+def test_a_session_runs_to_its_end_and_its_log_folds_to_the_same_state(finished):
+    done = finished
     assert done.end_reason == ""
     assert done.state.closed
     assert fold_session(done.folder).state == done.state
     assert {t.phase for t in done.state.trials} == {Phase.TRAINING, Phase.TEST}
 
 
-def test_each_fact_is_logged_before_the_next_thing_happens(sitter):
-    kinds = [event.event for event in read_log(sitter.whole().folder.log).events]
+def test_each_fact_is_logged_before_the_next_thing_happens(finished):
+    kinds = [event.event for event in read_log(finished.folder.log).events]
     assert (kinds[0], kinds[-1]) == ("session_opened", "session_closed")
     trials = [kind for kind in kinds if kind.startswith(("trial", "answer"))]
     assert trials == ["trial_presented", "answer_given", "trial_measured"] * (len(trials) // 3)
     assert kinds.count("rest_taken") == 2
 
 
-def test_the_same_seed_gives_the_same_trials(sitter):
-    first, second = sitter.whole("P01").state, sitter.whole("P02").state
+def test_the_same_seed_gives_the_same_trials(brief):
+    first, second = brief.whole("P01").state, brief.whole("P02").state
     nameless = [[replace(t, subject="", session="", onset_s=None) for t in state.trials] for state in (first, second)]
     assert nameless[0] == nameless[1]
     onsets = [[t.onset_s for t in state.trials] for state in (first, second)]
@@ -54,17 +54,16 @@ def test_another_seed_gives_others(sitter):
     assert [t.direction_shown for t in sitter.whole("P02").state.trials] != [t.direction_shown for t in first.trials]
 
 
-def test_what_was_really_played_is_measured_and_kept(sitter):
-    done = sitter.whole()
-    events = [e for e in read_log(done.folder.log).events if isinstance(e, TrialMeasured)]
-    assert len(events) == len([t for t in done.state.trials if t.is_valid])
-    for event, trial in zip(events, done.state.trials, strict=True):
+def test_what_was_really_played_is_measured_and_kept(finished):
+    events = [e for e in read_log(finished.folder.log).events if isinstance(e, TrialMeasured)]
+    assert len(events) == len([t for t in finished.state.trials if t.is_valid])
+    for event, trial in zip(events, finished.state.trials, strict=True):
         assert event.missed_ticks == 0
         assert trial.delivered_mps2 > 0.5 * trial.level_n
         assert trial.off_axis_mps2 < trial.delivered_mps2
-    recording = read_recording(done.folder.path / events[-1].recording)
+    recording = read_recording(finished.folder.path / events[-1].recording)
     assert len(recording) == 200
-    assert recording.meta["frequency_hz"] == done.state.trials[-1].frequency_hz
+    assert recording.meta["frequency_hz"] == finished.state.trials[-1].frequency_hz
     assert recording.excitation is not None
 
 
@@ -80,8 +79,8 @@ def test_a_louder_level_is_a_stronger_acceleration(sitter):
     assert max(gains) < 1.5 * min(gains)
 
 
-def test_leaving_and_coming_back_changes_no_decision(sitter):
-    whole = decisions(sitter.whole("P02").state)
+def test_leaving_and_coming_back_changes_no_decision(sitter, played):
+    whole = decisions(played.state)
     left = sitter.interrupted(after=9)
     assert left.end_reason == "the participant left"
     assert not left.state.closed
@@ -90,34 +89,34 @@ def test_leaving_and_coming_back_changes_no_decision(sitter):
     assert decisions(done.state) == whole
 
 
-def test_the_log_only_grows(sitter):
-    left = sitter.interrupted(after=5)
+def test_the_log_only_grows(brief):
+    left = brief.interrupted(after=5)
     before = left.folder.log.read_bytes()
-    sitter.resumed(left.folder)
+    brief.resumed(left.folder)
     assert left.folder.log.read_bytes().startswith(before)
 
 
-def test_a_trial_that_was_open_at_the_end_is_void_and_drawn_again(sitter):
-    left = sitter.interrupted(after=3)
+def test_a_trial_that_was_open_at_the_end_is_void_and_drawn_again(brief):
+    left = brief.interrupted(after=1)
     spoiled = [e for e in read_log(left.folder.log).events if isinstance(e, TrialSpoiled)]
-    assert [(e.trial, e.attempt, e.reason) for e in spoiled] == [(3, 0, "the participant left")]
-    done = sitter.resumed(left.folder)
-    again = [t for t in done.state.trials if (t.run, t.trial) == (0, 3)]
+    assert [(e.trial, e.attempt, e.reason) for e in spoiled] == [(1, 0, "the participant left")]
+    done = brief.resumed(left.folder)
+    again = [t for t in done.state.trials if (t.run, t.trial) == (0, 1)]
     assert [(t.attempt, t.status) for t in again] == [(0, TrialStatus.SPOILED), (1, TrialStatus.OK)]
     assert again[0].level_n == again[1].level_n
 
 
-def test_a_repeat_that_was_asked_for_is_drawn_again_in_the_same_sitting(sitter):
+def test_a_repeat_that_was_asked_for_is_drawn_again_in_the_same_sitting(brief):
     done = conduct_new(
-        sitter.plan(), "simulated", sitter.participant(4, lambda: Unanswered("asked to repeat", ends_sitting=False))
+        brief.plan(), "simulated", brief.participant(4, lambda: Unanswered("asked to repeat", ends_sitting=False))
     )
     assert done.state.closed
     assert sum(t.status is TrialStatus.SPOILED for t in done.state.trials) == 1
 
 
-def test_a_crash_between_answer_and_measurement_loses_nothing(sitter, session_logs):
+def test_a_crash_between_answer_and_measurement_loses_nothing(sitter, finished, session_logs):
     """The log is cut right after an answer, as a SIGKILL there would leave it; the recording reached the disk."""
-    done = sitter.whole()
+    done = finished
     lines = done.folder.log.read_bytes().splitlines(keepends=True)
     cut = max(i for i, line in enumerate(lines) if b'"answer_given"' in line)
     session_logs.cut(done.folder.path, cut + 1)
@@ -128,8 +127,8 @@ def test_a_crash_between_answer_and_measurement_loses_nothing(sitter, session_lo
     assert last.delivered_mps2 == pytest.approx(done.state.trials[-1].delivered_mps2, rel=1e-5)
 
 
-def test_the_answer_counts_even_when_its_recording_was_lost(sitter, session_logs):
-    done = sitter.whole()
+def test_the_answer_counts_even_when_its_recording_was_lost(sitter, finished, session_logs):
+    done = finished
     lines = done.folder.log.read_bytes().splitlines(keepends=True)
     cut = max(i for i, line in enumerate(lines) if b'"answer_given"' in line)
     session_logs.cut(done.folder.path, cut + 1)
@@ -152,8 +151,10 @@ def test_the_answer_counts_even_when_its_recording_was_lost(sitter, session_logs
         (b'"fault":"NONE","felt_whole":true', b'"fault":"LATER","felt_whole":false', "no plausible number"),
     ],
 )
-def test_an_answer_whose_program_died_is_judged_by_what_was_logged_with_it(sitter, session_logs, old, new, reason):
-    done = sitter.whole()
+def test_an_answer_whose_program_died_is_judged_by_what_was_logged_with_it(
+    sitter, finished, session_logs, old, new, reason
+):
+    done = finished
     lines = done.folder.log.read_bytes().splitlines()
     cut = max(i for i, line in enumerate(lines) if b'"answer_given"' in line)
     session_logs.cut(done.folder.path, cut + 1)
@@ -170,11 +171,11 @@ def test_an_answer_whose_program_died_is_judged_by_what_was_logged_with_it(sitte
     assert resumed.state.closed
 
 
-def test_a_torn_last_line_is_mended_and_remembered(sitter):
-    left = sitter.interrupted(after=6)
+def test_a_torn_last_line_is_mended_and_remembered(brief):
+    left = brief.interrupted(after=6)
     whole = left.folder.log.read_bytes()
     left.folder.log.write_bytes(whole + b'{"utc": "2026", "run": 0, "tri')
-    resumed = sitter.resumed(left.folder)
+    resumed = brief.resumed(left.folder)
     assert resumed.state.closed
     text = left.folder.log.read_bytes()
     assert text.startswith(whole)
@@ -199,10 +200,9 @@ def test_a_protocol_changed_in_the_log_is_found_out(sitter, session_logs):
         sitter.resumed(left.folder)
 
 
-def test_a_finished_session_is_not_resumed(sitter):
-    done = sitter.whole()
+def test_a_finished_session_is_not_resumed(sitter, finished):
     with pytest.raises(StudyError, match="This session is finished"):
-        sitter.resumed(done.folder)
+        sitter.resumed(finished.folder)
 
 
 def test_a_log_without_an_opening_line_says_that_nothing_is_lost(sitter):
@@ -220,18 +220,18 @@ def test_a_session_that_runs_elsewhere_is_refused_and_unchanged(sitter):
     assert left.folder.log.read_bytes() == before
 
 
-def test_ctrl_c_leaves_a_log_that_can_be_resumed(sitter):
+def test_ctrl_c_leaves_a_log_that_can_be_resumed(brief):
     def press() -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(UserInterruptError) as left:
-        sitter.interrupted(after=4, instead=press)
+        brief.interrupted(after=4, instead=press)
     assert left.value.saved == "4 answers are on disk."
     assert left.value.do_now.startswith("Continue with: hapteq resume ")
-    (folder,) = [f for f in sitter.data.iterdir() if f.is_dir()]
+    (folder,) = [f for f in brief.data.iterdir() if f.is_dir()]
     from study.store.sessions.archive import SessionFolder
 
-    assert sitter.resumed(SessionFolder(folder)).state.closed
+    assert brief.resumed(SessionFolder(folder)).state.closed
 
 
 def test_a_device_that_does_not_exist_makes_no_session(sitter):
@@ -275,8 +275,8 @@ def test_nothing_is_presented_when_the_log_cannot_be_written(sitter, monkeypatch
     assert len(list((folder / "recordings").glob("*.h5"))) == 2
 
 
-def test_a_finished_session_folder_is_valid_and_a_changed_recording_is_found(sitter):
-    done = sitter.whole()
+def test_a_finished_session_folder_is_valid_and_a_changed_recording_is_found(finished):
+    done = finished
     write_tables(done.folder)
     sound = validate_file(done.folder.path)
     assert sound.problems == ()
@@ -289,8 +289,8 @@ def test_a_finished_session_folder_is_valid_and_a_changed_recording_is_found(sit
     assert "is not the file that was written" in problem
 
 
-def test_a_missing_recording_and_a_changed_table_are_found(sitter):
-    done = sitter.whole()
+def test_a_missing_recording_and_a_changed_table_are_found(finished):
+    done = finished
     write_tables(done.folder)
     sorted(done.folder.recordings.iterdir())[0].unlink()
     table = done.folder.path / "trials.csv"

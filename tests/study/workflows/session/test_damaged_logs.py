@@ -146,6 +146,7 @@ def test_what_a_kill_left_out_is_finished_and_said(session, name):
         assert (session / name).read_bytes() == before
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_finished_session_is_finished_by_resume_and_then_said_to_be(session):
     folder = SessionFolder(session)
     (session / SEAL_NAME).unlink()

@@ -58,8 +58,7 @@ def test_who_asks_again_when_unsure_is_flagged_and_within_the_limit(sitter, seed
     "observer",
     [
         "ideal",
-        "guesser",
-        *slow("lapsing", "criterion_drift"),
+        *slow("guesser", "lapsing", "criterion_drift"),
     ],
 )
 def test_who_asks_for_nothing_is_not_flagged(sitter, observer):

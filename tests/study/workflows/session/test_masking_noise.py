@@ -50,6 +50,11 @@ class Sound:
         return played
 
 
+@pytest.fixture
+def sitter(brief):
+    return brief
+
+
 def asks_for_noise(sitter) -> None:
     sitter.text += "\n[masking]\nplay = true\nlevel_db = -20.0\nseed = 5\n"
     sitter.protocol = replace(sitter.protocol, masking=SETTINGS)

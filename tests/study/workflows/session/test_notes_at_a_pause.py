@@ -36,11 +36,11 @@ class PausesOnce:
 
 
 @pytest.mark.parametrize("decision", AfterPause)
-def test_notes_and_adverse_events_are_in_the_log_however_the_pause_ends(sitter, decision):
+def test_notes_and_adverse_events_are_in_the_log_however_the_pause_ends(brief, decision):
     clock, requests = VirtualClock(), QueuedRequests()
     display = SimulatedDisplay(find_observer("scripted", 11), 11, clock)
     participant = Participant(PausesOnce(display, decision, requests), display, clock, requests)
-    conducted = conduct_new(sitter.plan(), "simulated", participant)
+    conducted = conduct_new(brief.plan(), "simulated", participant)
     events = read_log(conducted.folder.log).events
     notes = [(event.text, event.adverse) for event in events if isinstance(event, NoteTaken)]
     assert notes == [("the phone rang", False), ("the thumb is numb", True)]

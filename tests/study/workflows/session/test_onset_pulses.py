@@ -16,6 +16,11 @@ LINE = "byte 1 of /dev/ttyUSB0"
 
 
 @pytest.fixture
+def sitter(brief):
+    return brief
+
+
+@pytest.fixture
 def pulses(monkeypatch):
     """In the place of the lab's line: every third pulse is lost."""
     given: list[Pulse] = []

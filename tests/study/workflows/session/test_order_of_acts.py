@@ -56,6 +56,11 @@ class FollowedSession:
 
 
 @pytest.fixture
+def sitter(brief):
+    return brief
+
+
+@pytest.fixture
 def watched(monkeypatch, synchronising_disk) -> FollowedSession:
     notes = FollowedSession()
     real_open, real_append, real_fsync = conduct_session.open_device, EventLog.append, os.fsync

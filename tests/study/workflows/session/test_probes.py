@@ -38,9 +38,25 @@ def with_probes(protocol):
 
 @pytest.fixture
 def probed(sitter):
+    return add_probes(sitter)
+
+
+@pytest.fixture
+def briefly_probed(brief):
+    brief.protocol = replace(brief.protocol, stimulus=replace(brief.protocol.stimulus, frequencies_hz=(35.0,)))
+    return add_probes(brief)
+
+
+def add_probes(sitter):
     sitter.protocol = with_probes(sitter.protocol)
     sitter.text = dump_protocol(sitter.protocol)
     return sitter
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, sitter_of, small_protocol):
+    """A finished session with probes, which no test changes."""
+    return add_probes(sitter_of(tmp_path_factory.mktemp("probed") / "data", small_protocol, "")).whole()
 
 
 def events_of(folder):
@@ -51,8 +67,8 @@ def trials_of(done):
     return [(t.run, t.trial, t.level_n, t.answer) for t in done.state.trials if t.is_valid]
 
 
-def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(probed):
-    done = probed.whole()
+def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(whole):
+    done = whole
     assert done.end_reason == ""
     events = events_of(done.folder)
     played = {e.number: e for e in events if isinstance(e, ProbePlayed)}
@@ -73,33 +89,30 @@ def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(probe
 
 
 @pytest.mark.slow
-def test_levels_come_in_turn_and_never_sooner_than_the_protocol_says(probed):
-    hand = [e for e in events_of(probed.whole().folder) if isinstance(e, ProbePlayed) and e.kind == "hand"]
+def test_levels_come_in_turn_and_never_sooner_than_the_protocol_says(whole):
+    hand = [e for e in events_of(whole.folder) if isinstance(e, ProbePlayed) and e.kind == "hand"]
     assert [e.level_n for e in hand] == [PROBES.levels_n[i % 3] for i in range(len(hand))]
     assert min(np.diff([e.monotonic_s for e in hand])) >= PROBES.interval_s
 
 
-def test_a_probes_answer_never_reaches_that_of_a_trial(sitter, sitter_of, tmp_path):
-    plain = sitter.whole()
-    protocol = with_probes(sitter.protocol)
-    other = sitter_of(tmp_path / "other", protocol, dump_protocol(protocol)).whole()
-    assert trials_of(plain) == trials_of(other)
+def test_a_probes_answer_never_reaches_that_of_a_trial(played, whole):
+    assert trials_of(played) == trials_of(whole)
 
 
-def test_a_probe_is_on_the_disk_before_the_device_moves(probed, monkeypatch):
+def test_a_probe_is_on_the_disk_before_the_device_moves(briefly_probed, monkeypatch):
     calls, hold, append = [], SafeDevice.hold, EventLog.append
     monkeypatch.setattr(SafeDevice, "hold", lambda self, stimulus: calls.append("hold") or hold(self, stimulus))
     monkeypatch.setattr(EventLog, "append", lambda self, event: append(self, event) or calls.append(event.event))
-    probed.whole()
+    briefly_probed.whole()
     for place, call in enumerate(calls):
         if call == "probe_played" and calls[place + 1] != "probe_measured":
             assert calls[place + 1] == "hold"
     assert "probe_played" in calls
 
 
-def test_a_handle_that_is_still_held_gets_no_reference_and_the_session_goes_on(probed, monkeypatch):
+def test_a_handle_that_is_still_held_gets_no_reference_and_the_session_goes_on(briefly_probed, monkeypatch):
     monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on_handle: None)
-    done = probed.whole()
+    done = briefly_probed.whole()
     events = events_of(done.folder)
     assert done.end_reason == ""
     assert not [e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]
@@ -111,7 +124,7 @@ def test_a_handle_that_is_still_held_gets_no_reference_and_the_session_goes_on(p
     [pytest.param(-1.0, marks=pytest.mark.slow), 0.0, pytest.param(np.nan, marks=pytest.mark.slow)],
     ids=["turned over", "dead", "no number"],
 )
-def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(probed, monkeypatch, factor):
+def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(briefly_probed, monkeypatch, factor):
     hold = play_probe.release_device
 
     def wrong(sitting):
@@ -122,7 +135,7 @@ def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(pr
 
     monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on_handle: None)
     monkeypatch.setattr(play_probe, "release_device", wrong)
-    done = probed.whole()
+    done = briefly_probed.whole()
     events = events_of(done.folder)
     assert done.end_reason == ""
     assert not [e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]
@@ -130,8 +143,8 @@ def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(pr
 
 
 @pytest.mark.slow
-def test_the_free_handle_is_compared_at_the_level_of_the_probe_in_the_hand(probed):
-    events = [e for e in events_of(probed.whole().folder) if isinstance(e, ProbePlayed)]
+def test_the_free_handle_is_compared_at_the_level_of_the_probe_in_the_hand(whole):
+    events = [e for e in events_of(whole.folder) if isinstance(e, ProbePlayed)]
     free = next(number for number, e in enumerate(events) if e.kind == "free")
     assert events[free].level_n == events[free - 1].level_n
     assert events[free - 1].kind == "hand"
@@ -192,8 +205,8 @@ def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monke
     assert len([e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]) == 2
 
 
-def test_a_probe_within_a_trial_or_above_its_cap_is_refused_by_the_log(probed):
-    state = replace(probed.whole().state, closed=False)
+def test_a_probe_within_a_trial_or_above_its_cap_is_refused_by_the_log(whole):
+    state = replace(whole.state, closed=False)
     number = state.sitting.probing.probe_count
     probe = ProbePlayed("2026-01-01T00:00:00.000+00:00", number, "hand", 0.8)
     with pytest.raises(LogContradictionError, match="allows 1 N"):

@@ -37,10 +37,10 @@ def stimulus(trial):
 
 
 @pytest.mark.parametrize(("reply", "cause"), CAUSES, ids=lambda value: getattr(value, "name", ""))
-def test_each_cause_is_logged_in_the_table_and_followed_by_the_same_stimulus(sitter, reply, cause):
-    end = conduct_new(sitter.plan(), "simulated", sitter.participant(6, lambda: reply))
+def test_each_cause_is_logged_in_the_table_and_followed_by_the_same_stimulus(brief, reply, cause):
+    end = conduct_new(brief.plan(), "simulated", brief.participant(6, lambda: reply))
     if end.end_reason:
-        end = sitter.resumed(end.folder)
+        end = brief.resumed(end.folder)
     write_tables(end.folder)
     trials = read_trials(end.folder.path / TRIALS_NAME)
     (void,) = [trial for trial in trials if trial.void_cause is not None]
@@ -76,11 +76,11 @@ def test_a_display_that_lets_a_used_up_repeat_through_is_asked_again(sitter):
     assert {question.repeats_left for question in asked} == {0, 1, 2, 3}
 
 
-def test_without_repeats_the_key_is_refused_from_the_first_trial(sitter):
-    none = replace(sitter.protocol, trial=replace(sitter.protocol.trial, repeats_per_run=0))
-    sitter.protocol, sitter.text = none, f"{sitter.text}\n[trial]\nrepeats_per_run = 0\n"
-    sitting = sitter.participant(2, lambda: REPEAT)
-    end = conduct_new(sitter.plan(), "simulated", sitting)
+def test_without_repeats_the_key_is_refused_from_the_first_trial(brief):
+    none = replace(brief.protocol, trial=replace(brief.protocol.trial, repeats_per_run=0))
+    brief.protocol, brief.text = none, f"{brief.text}\n[trial]\nrepeats_per_run = 0\n"
+    sitting = brief.participant(2, lambda: REPEAT)
+    end = conduct_new(brief.plan(), "simulated", sitting)
     assert end.state.closed
     assert all(trial.void_cause is None for trial in end.state.trials)
 

@@ -16,6 +16,11 @@ from study.workflows.views.plan_study import format_plan_lines, list_planned_stu
 
 
 @pytest.fixture
+def sitter(brief):
+    return brief
+
+
+@pytest.fixture
 def balanced(sitter):
     """The small protocol with two frequencies in a Williams design, for four people."""
     protocol = replace(

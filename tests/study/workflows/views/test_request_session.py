@@ -35,8 +35,8 @@ def now() -> str:
 
 
 @pytest.fixture
-def whole(sitter) -> SessionFolder:
-    return sitter.whole().folder
+def whole(finished) -> SessionFolder:
+    return finished.folder
 
 
 def test_a_fresh_live_state_saves_the_look_at_the_lock(sitter):
@@ -131,14 +131,25 @@ def test_a_note_on_a_session_that_does_not_run_is_written_into_its_log(whole):
     assert validate_file(whole.path).problems == ()
 
 
-def test_a_torn_line_is_kept_as_a_note_before_the_note(sitter):
-    folder = sitter.interrupted(after=2).folder
+def test_a_waiting_note_behind_many_unusable_files_is_written_too(whole):
+    """A call of a running session's loop takes 50 files, and may set all of them aside."""
+    inbox = RequestInbox(whole.path)
+    inbox.clear()
+    for number in range(60):
+        (whole.path / "requests" / f"note-00{number:03d}.json").write_text("{")
+    inbox.send(replace(NOTE, text="waits"))
+    assert take_note(whole, NOTE, RealClock())
+    assert [event.text for event in read_log(whole.log).events[-2:]] == ["waits", NOTE.text]
+
+
+def test_a_torn_line_is_kept_as_a_note_before_the_note(brief):
+    folder = brief.interrupted(after=2).folder
     folder.log.write_bytes(folder.log.read_bytes() + b'{"utc":"2026')
     take_note(folder, NOTE, RealClock())
     mended, note = read_log(folder.log).events[-2:]
     assert (mended.who, mended.text) == ("program", 'a torn last line was cut off: {"utc":"2026')
     assert note.text == NOTE.text
-    assert sitter.resumed(folder).state.closed
+    assert brief.resumed(folder).state.closed
 
 
 def test_an_empty_note_is_none(whole):
@@ -150,8 +161,8 @@ def test_an_empty_note_is_none(whole):
     assert whole.log.read_bytes() == before
 
 
-def test_a_note_that_the_session_did_not_hear_before_its_end_is_written_into_its_log(sitter, monkeypatch):
-    folder = sitter.whole().folder
+def test_a_note_that_the_session_did_not_hear_before_its_end_is_written_into_its_log(whole, monkeypatch):
+    folder = whole
     earlier_texts = [f"an earlier one, {number}" for number in range(60)]  # more than the inbox hands out at once
     for text in earlier_texts:
         RequestInbox(folder.path).send(replace(NOTE, text=text))

@@ -14,21 +14,9 @@ from study.workflows.views.view_home import list_session_lines, make_home_view
 from study.workflows.views.view_session import make_session_view
 
 
-@pytest.fixture(scope="module")
-def taken(tmp_path_factory, small_text) -> Path:
-    """A data folder with a finished session; copied by tests that change it."""
-    from study.cli.main import main
-
-    folder = tmp_path_factory.mktemp("taken")
-    (folder / "small.toml").write_text(small_text)
-    asked = ["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", "3"]
-    assert main([*asked, "--subject", "P01", "--data", str(folder / "data")]) == 0
-    return folder / "data"
-
-
 @pytest.fixture
-def data(taken, tmp_path) -> Path:
-    return Path(shutil.copytree(taken, tmp_path / "data"))
+def data(taken_data, tmp_path) -> Path:
+    return Path(shutil.copytree(taken_data, tmp_path / "data"))
 
 
 @pytest.fixture

@@ -13,15 +13,9 @@ from study.workflows.views.session_line import make_session_line
 from study.workflows.views.view_session import make_session_view
 
 
-@pytest.fixture(scope="module")
-def taken(tmp_path_factory, small_text) -> Path:
-    from study.cli.main import main
-
-    folder = tmp_path_factory.mktemp("taken")
-    (folder / "small.toml").write_text(small_text)
-    asked = ["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", "3"]
-    assert main([*asked, "--subject", "P01", "--data", str(folder / "data")]) == 0
-    return folder / "data" / "P01_001"
+@pytest.fixture
+def taken(taken_data) -> Path:
+    return taken_data / "P01_001"
 
 
 @pytest.fixture

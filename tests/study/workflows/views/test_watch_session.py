@@ -40,8 +40,8 @@ class Growing:
 
 
 @pytest.fixture
-def whole(sitter) -> SessionFolder:
-    return sitter.whole().folder
+def whole(finished) -> SessionFolder:
+    return finished.folder
 
 
 @pytest.fixture

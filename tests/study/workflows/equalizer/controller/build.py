@@ -1,5 +1,6 @@
 """A model, and its exported sources compiled as strictly as a user may."""
 
+import os
 import subprocess
 from pathlib import Path
 
@@ -43,5 +44,8 @@ def compiled_cpp(vendor, source: Path, *folders: Path, options: tuple[str, ...] 
     return out, done.stderr
 
 
-def run(program: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([str(program), *words], capture_output=True, text=True, timeout=60, check=False)
+def run(program: Path, *words: str, **variables: float) -> subprocess.CompletedProcess[str]:
+    """With variables of the environment."""
+    environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
+    command = [str(program), *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=environment)

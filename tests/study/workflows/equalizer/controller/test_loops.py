@@ -4,6 +4,7 @@ Both run on a clock that goes on by what they sleep, and a device that writes do
 """
 
 import re
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ FAKE_CLOCK = """
 #define _POSIX_C_SOURCE 200809L
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <time.h>
 static long long fake_ns = 100000000000LL;
 static int fake_gettime(clockid_t which, struct timespec *now)
@@ -47,10 +49,10 @@ static int device_send(const double force[HAPTEQ_INPUTS])
     static int sends = 0;
     printf("sent %.17g %.17g %.17g\\n", force[0], force[1], force[2]);
     if (++sends == 10) {
-        fake_ns += (long long)(1e6 * STALL_MS);
-        if (SIGNAL)
-            raise(SIGNAL);
-        return !GONE;
+        fake_ns += (long long)(1e6 * atof(getenv("STALL_MS")));
+        if (atoi(getenv("SIGNAL")))
+            raise(atoi(getenv("SIGNAL")));
+        return !atoi(getenv("GONE"));
     }
     return 1;
 }
@@ -65,22 +67,18 @@ def forces_of(said: str) -> np.ndarray:
     return np.array([line.split()[1:] for line in said.splitlines() if line.startswith("sent")], dtype=float)
 
 
-@pytest.fixture
-def example(vendor, exported, tmp_path):
+@pytest.fixture(scope="module")
+def example(vendor, exported, tmp_path_factory):
     """example(stall_ms, signal, gone): what the example loop says where this comes over it at the tenth force."""
-
-    def looped(stall_ms: float = 0.0, signal: str = "0", gone: int = 0):
-        source = (exported.plan.out / "example_loop.c").read_text()
-        mine = re.compile(r"(?<=/\* ---- your device ---- \*/\n).*?(?=/\* ---- the loop)", re.DOTALL)
-        source, found = mine.subn(lambda _: FAKE_DEVICE, source)
-        assert found == 1
-        (tmp_path / "clock.h").write_text(FAKE_CLOCK)
-        (tmp_path / "loop.c").write_text(source)
-        given = (f"-DSTALL_MS={stall_ms}", f"-DSIGNAL={signal}", f"-DGONE={gone}")
-        where = (f"-I{exported.plan.out}", "-include", str(tmp_path / "clock.h"))
-        return run(build(vendor, tmp_path, "loop.c", *where, *given), "0.06")
-
-    return looped
+    folder = tmp_path_factory.mktemp("example")
+    source = (exported.plan.out / "example_loop.c").read_text()
+    mine = re.compile(r"(?<=/\* ---- your device ---- \*/\n).*?(?=/\* ---- the loop)", re.DOTALL)
+    source, found = mine.subn(lambda _: FAKE_DEVICE, source)
+    assert found == 1
+    (folder / "clock.h").write_text(FAKE_CLOCK)
+    (folder / "loop.c").write_text(source)
+    program = build(vendor, folder, "loop.c", f"-I{exported.plan.out}", "-include", str(folder / "clock.h"))
+    return lambda stall_ms=0.0, signal=0, gone=0: run(program, "0.06", STALL_MS=stall_ms, SIGNAL=int(signal), GONE=gone)
 
 
 @pytest.fixture(scope="module")
@@ -124,9 +122,9 @@ def test_a_loop_that_stood_still_sets_zero_and_ends(example, rows):
     assert "\nreleased\n" in done.stdout and "stood still" in done.stdout
 
 
-@pytest.mark.parametrize("signal", ["SIGTERM", *slow("SIGINT", "SIGHUP")])
-def test_a_signal_ends_the_example_with_zero_force(example, rows, signal):
-    done = example(signal=signal)
+@pytest.mark.parametrize("number", [signal.SIGTERM, *slow(signal.SIGINT, signal.SIGHUP)])
+def test_a_signal_ends_the_example_with_zero_force(example, rows, number):
+    done = example(signal=number)
     assert done.returncode == 0
     sent = forces_of(done.stdout)
     assert rows[AFTER - 1].any() and len(sent) == AFTER + 1 and not sent[-1].any()
@@ -166,19 +164,20 @@ struct fake_clock {
 """
 FAKE_CHAI3D = """
 #include <cstdio>
+#include <cstdlib>
 static std::atomic<bool> running{true};
 struct Fake : chai3d::cGenericHapticDevice {
     int sends = 0;
     bool getPosition(chai3d::cVector3d &position) override
     {
-        position = chai3d::cVector3d(0.0, 0.0, Z_M);
+        position = chai3d::cVector3d(0.0, 0.0, std::atof(std::getenv("Z_M")));
         return true;
     }
     bool setForce(const chai3d::cVector3d &force) override
     {
         std::printf("sent %.17g %.17g %.17g\\n", force.x(), force.y(), force.z());
         if (++sends == 10)
-            fake_clock::elapsed += std::chrono::microseconds(STALL_US);
+            fake_clock::elapsed += std::chrono::microseconds(std::atoi(std::getenv("STALL_US")));
         running = sends < 40;
         return true;
     }
@@ -187,24 +186,23 @@ int main() { haptics(std::make_shared<Fake>(), running); }
 """
 
 
-@pytest.fixture
-def chai3d(vendor, exported, tmp_path):
+@pytest.fixture(scope="module")
+def chai3d(vendor, exported, tmp_path_factory):
     """chai3d(z_m, stall_ms): the forces (n, 3) that the snippet sends while the handle stays at z."""
+    code = snippet("chai3d.h")
+    for real, fake in (
+        ("std::chrono::steady_clock", "fake_clock"),
+        ("std::this_thread::sleep_until", "fake_clock::sleep_until"),
+    ):
+        assert code.count(real) == 1
+        code = code.replace(real, fake)
+    source = tmp_path_factory.mktemp("chai3d") / "snippet.cpp"
+    source.write_text(FAKE_CHAI3D_CLOCK + code + FAKE_CHAI3D)
+    program, said = compiled_cpp(vendor, source, exported.plan.out, options=())
+    assert said == ""
 
-    def looped(z_m: float | str, stall_ms: float = 0.0) -> np.ndarray:
-        code = snippet("chai3d.h")
-        for real, fake in (
-            ("std::chrono::steady_clock", "fake_clock"),
-            ("std::this_thread::sleep_until", "fake_clock::sleep_until"),
-        ):
-            assert code.count(real) == 1
-            code = code.replace(real, fake)
-        source = tmp_path / "snippet.cpp"
-        source.write_text(FAKE_CHAI3D_CLOCK + code + FAKE_CHAI3D)
-        given = (f"-DZ_M={z_m}", f"-DSTALL_US={round(1000 * stall_ms)}")
-        program, said = compiled_cpp(vendor, source, exported.plan.out, options=given)
-        assert said == ""
-        return forces_of(run(program).stdout)
+    def looped(z_m: float, stall_ms: float = 0.0) -> np.ndarray:
+        return forces_of(run(program, Z_M=z_m, STALL_US=round(1000 * stall_ms)).stdout)
 
     return looped
 

@@ -20,6 +20,11 @@ from study.workflows.session.open_session import SessionPlan
 from tests.study.workflows.session.sitting.person import Person
 
 
+@pytest.fixture(scope="session")
+def small_protocol(brief_protocol):
+    return brief_protocol
+
+
 @pytest.fixture
 def clock():
     return VirtualClock()

@@ -20,6 +20,7 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, read_log
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
+from tests.slow_instances import slow
 from tests.study.workflows.session.sitting.person import Person, of
 
 
@@ -254,7 +255,7 @@ def test_a_note_is_logged_where_ctrl_c_comes_after_the_session_was_closed(plan, 
     assert [note.text for note in of(end, NoteTaken)] == ["a rash"]
 
 
-@pytest.mark.parametrize("call", ["fill_in", "device_checked", "welcome", "await_return", "practice_over"])
+@pytest.mark.parametrize("call", ["fill_in", "await_return", *slow("device_checked", "welcome", "practice_over")])
 def test_a_stop_ends_each_screen_that_waits_for_the_participant(plan, full, seat, person, tmp_path, call):
     listeners = []
 
