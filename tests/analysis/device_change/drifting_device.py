@@ -39,7 +39,7 @@ def play(wave_n, truths: list[Truth], levels_n, seed: int) -> list[Recording]:
     each = np.array([list(vars(truth).values()) for truth in truths], float)
     noise = np.random.default_rng(seed).normal(size=(PERIODS * len(wave_n), len(truths), 3)) * NOISE_MPS2
     levels = np.asarray(levels_n, float)
-    rows = _move(np.asarray(wave_n, float), each, levels, noise, np.array(MODES), BRISTLE_M)
+    rows = _move(np.asarray(wave_n, float), each, levels, noise, np.reshape(MODES, (-1, 3)).astype(float), BRISTLE_M)
     names = ("command", "excitation", "position", "acceleration")
     return [_recording(dict(zip(names, rows[:, :, probe], strict=True))) for probe in range(len(truths))]
 
