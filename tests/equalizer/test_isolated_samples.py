@@ -86,3 +86,51 @@ def test_only_motions_are_changed_and_the_user_is_told():
     np.testing.assert_array_equal(changed.response.samples[:, 1], motion)
     assert np.isnan(changed.response.samples[2500, 0])
     assert np.nanmax(np.abs(changed.response.samples[:, 0] - motion)) < 0.06
+
+
+def test_flicker_of_one_of_several_encoders_at_rest_is_not_changed():
+    """Steps of a position computed from three encoders are often much smaller than those of one of them."""
+    random, counts = np.random.default_rng(5), np.round(20 * np.stack([move(seed) for seed in (1, 2, 3)], axis=1))
+    counts[:3000] = 4
+    counts[:3000, 0] += random.random(3000) < 0.01
+    readings = counts @ [1e-4, 0.73e-4, -0.41e-4]
+    np.testing.assert_array_equal(replace_isolated_samples(readings), readings)
+
+
+@pytest.mark.parametrize("length", [2, 3])
+def test_short_slips_are_not_changed(length):
+    readings = 0.01 * np.random.default_rng(2).standard_normal(SAMPLES)
+    for start in range(50, SAMPLES - 50, 97):
+        readings[start : start + length] += np.sin(np.pi * (np.arange(length) + 0.5) / length)
+    np.testing.assert_array_equal(replace_isolated_samples(readings), readings)
+
+
+@pytest.mark.parametrize("after", [1, 2, 3])
+def test_a_step_close_to_the_end_is_not_changed(after):
+    readings = np.zeros(SAMPLES)
+    readings[500:3000], readings[-after:] = move(3)[500:3000], 2.0
+    np.testing.assert_array_equal(replace_isolated_samples(readings), readings)
+
+
+def test_the_response_to_a_jump_of_the_command_is_not_changed():
+    """A body on a spring, 30 Hz and critically damped, sampled at 100 Hz: after a step of the force it moves for two
+    samples."""
+    time_s, jumps = np.arange(SAMPLES) / 100, np.zeros(SAMPLES)
+    jumps[100::400] = 1.0
+    velocity = np.convolve(jumps, time_s * np.exp(-2 * np.pi * 30 * time_s))[:SAMPLES]
+    velocity += 1e-3 * velocity.std() * np.random.default_rng(1).standard_normal(SAMPLES)
+    recording = Recording(
+        "device",
+        Signal(np.cumsum(jumps)[:, None], 100.0, "force", "N", ("fx",)),
+        Signal(velocity[:, None], 100.0, "velocity", "m/s", ("x",)),
+    )
+    assert not np.array_equal(replace_isolated_samples(velocity), velocity)
+    assert interpolate_isolated_samples(recording) == (recording, "")
+
+
+def test_samples_without_a_time_axis_are_not_changed():
+    readings = move(3) + 0.01 * np.random.default_rng(4).standard_normal(SAMPLES)
+    readings[1000:5000:1000] += 5.0
+    signals = [Signal(readings[:, None], 1.0, *each, ("x",)) for each in (("force", "N"), ("position", "m"))]
+    recording = Recording("device", *signals, meta={"time": "unknown"})
+    assert interpolate_isolated_samples(recording) == (recording, "")

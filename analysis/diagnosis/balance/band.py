@@ -60,6 +60,8 @@ def _find_usable_lines_hz(column: FloatArray, rate_hz: float, exponent: int) -> 
     """Find the frequencies (lines,) in Hz up to which (exponent < 0: from which on) the noise of a channel (n,) is at
     most `ACCELERATION_NOISE_SHARE` of its signal power, both weighted by f^exponent; none for mere noise."""
     frequency_hz, density, noise_density = _estimate_signal_and_noise_density(column, rate_hz)
+    if exponent < 0:  # the mean that is removed from each windowed segment leaks into its first line
+        frequency_hz, density = frequency_hz[1:], density[1:]
     weights = frequency_hz ** float(exponent)
     order = slice(None, None, -1 if exponent < 0 else 1)
     signal_power = np.cumsum((np.maximum(density - noise_density, 0.0) * weights)[order])[order]

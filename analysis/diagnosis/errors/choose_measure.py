@@ -24,7 +24,7 @@ from analysis.diagnosis.errors.error_measure_rule import (
 )
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.limits import UNKNOWN_NOISE_SHARE
-from analysis.diagnosis.noise.noise_floor import NoiseFloor, estimate_noise_floor
+from analysis.diagnosis.noise.noise_floor import NoiseFloor, choose_least_noise, estimate_noise_floor
 from analysis.diagnosis.noise.rounding import find_rounding_step
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import place_recorded_effects
@@ -166,8 +166,8 @@ def _exclude_transient(record: Observed, model: MechanicalModel) -> Observed:
 
 
 def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
-    """Estimate (c,): rms noise of each channel over all records, each with the noise of the record in which it is
-    least, or none where the channel is constant; `UNKNOWN_NOISE_SHARE` of the rms signal where unknown or 0."""
+    """Estimate (c,): rms noise of each channel (`choose_least_noise`); `UNKNOWN_NOISE_SHARE` of the rms signal where
+    unknown or 0."""
     channel_count = records[0].measured.shape[1]
     noise_by_record = [
         np.concatenate(
@@ -176,9 +176,7 @@ def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -
         for floor, record in zip(floors, records, strict=True)
     ]
     signal_rms = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
-    is_varying = np.array([(record.measured != record.measured[0]).any(axis=0) for record in records])
-    varying_share = np.average(is_varying, axis=0, weights=[len(record.measured) for record in records])
-    least_noise = np.fmin.reduce(np.where(is_varying, noise_by_record, np.nan)) * np.sqrt(varying_share)
+    least_noise = choose_least_noise(noise_by_record, [record.measured for record in records])
     return np.asarray(
         np.where(np.isfinite(least_noise) & (least_noise > 0), least_noise, UNKNOWN_NOISE_SHARE * signal_rms)
     )

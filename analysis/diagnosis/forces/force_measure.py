@@ -19,7 +19,7 @@ from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion
 from analysis.diagnosis.forces.inverse_response import compute_inverse_response
 from analysis.diagnosis.forces.predicted_force import PredictedForce, count_edge_samples
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.noise.noise_floor import NoiseFloor, choose_least_noise
 from equalizer.effects.simulation.forces_along_motion import compute_actuator_force
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import compute_low_pass_gain, filter_low_pass
@@ -74,9 +74,13 @@ def build_predicted_force_measure(
     used_forces = [record.measured[record.fit | record.choose | record.test] for record in force_records]
     has_role = any(len(used_force) for used_force in used_forces)
     forces = np.vstack(used_forces if has_role else [record.measured for record in force_records])
+    noise_by_record = [floor.response_rms for floor in force_floors]
+    least_noise = choose_least_noise(noise_by_record, [motion.position for motion in motions])
+    # Where an axis rests in all records, its force has the noise that the motion of the other axes causes.
+    least_noise = np.where(np.isnan(least_noise), np.fmin.reduce(noise_by_record), least_noise)
     # An unsuitable model overestimates the noise, so it is limited to the strongest force's standard deviation, because
     # that of an idle axis may be below the noise.
-    noise = np.minimum(np.fmin.reduce([floor.response_rms for floor in force_floors]), np.std(forces, axis=0).max())
+    noise = np.minimum(least_noise, np.std(forces, axis=0).max())
     noise = np.asarray(np.hypot(noise, ACTUATOR_ERROR_SHARE * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz
     band_motions = tuple(compute_band_motion(motion.position, rate_hz, band_hz) for motion in motions)
@@ -91,9 +95,9 @@ def _choose_band_hz(
     floors: Sequence[NoiseFloor],
     model: MechanicalModel,
 ) -> float:
-    """Choose the end in Hz of the widest tried band in which the rms noise of the record with the least noise is at
-    most `NOISE_SHARE` of the largest rms force of any record, without its mean; the narrowest band where there is
-    none."""
+    """Choose the end in Hz of the widest tried band in which the rms noise of the record with the least noise, of those
+    with motion, is at most `NOISE_SHARE` of the largest rms force of any record, without its mean; the narrowest band
+    where there is none."""
     rate_hz = records[0].recording.sample_rate_hz
     force_power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in applied_forces)
     widest_useful_share = (
@@ -110,8 +114,12 @@ def _choose_band_hz(
         * rate_hz
     ):
         least_noise = min(
-            float(np.max(_compute_force_noise(model, motion, floor, float(band_hz)).response_rms))
-            for motion, floor in zip(motions, floors, strict=True)
+            (
+                float(np.max(_compute_force_noise(model, motion, floor, float(band_hz)).response_rms))
+                for motion, floor in zip(motions, floors, strict=True)
+                if np.ptp(motion.position, axis=0).any()
+            ),
+            default=0.0,
         )
         if least_noise <= NOISE_SHARE * np.sqrt(force_power):
             break

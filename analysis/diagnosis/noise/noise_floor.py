@@ -89,6 +89,15 @@ def estimate_noise_floor(recording: Recording) -> NoiseFloor:
     return _build_noise_floor("unknown", lines_hz, unknown_estimates, signals, remark)
 
 
+def choose_least_noise(noise_by_record: Sequence[FloatArray], samples_by_record: Sequence[FloatArray]) -> FloatArray:
+    """Choose (c,): rms noise of each channel over all records, each with the noise of the record in which it is least,
+    or none where the channel is constant; NaN where it is unknown, or constant in all. noise_by_record: (c,) each;
+    samples_by_record: (n, c) each, NaN = missing."""
+    is_varying = np.array([np.fmin.reduce(samples) != np.fmax.reduce(samples) for samples in samples_by_record])
+    varying_share = np.average(is_varying, axis=0, weights=[len(samples) for samples in samples_by_record])
+    return np.asarray(np.fmin.reduce(np.where(is_varying, noise_by_record, np.nan)) * np.sqrt(varying_share))
+
+
 def _build_noise_floor(
     method: NoiseMethod,
     lines_hz: FloatArray,

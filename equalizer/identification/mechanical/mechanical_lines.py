@@ -73,8 +73,8 @@ SMOOTHING_LINES = 9
 """Number of lines over which the noise power between periods and, with a transient, the excitation power are averaged.
 Chosen."""
 
-HANN_POWER = 0.375
-"""Mean square of a Hann window: the share of a steady signal's power that it leaves."""
+TAPER_POWER = 0.5
+"""Mean square of a sine window: the share of a steady signal's power that it leaves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,8 +108,7 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
     transient = length != segment.period or starts == [segment.start]
     spectra = [_compute_spectra(signal.samples, starts, length) for signal in (recording.command, recording.response)]
     excitation = recording.command if recording.excitation is None else recording.excitation
-    excitation_spectra = _compute_spectra(excitation.samples, starts, length, tapered=transient)
-    excitation_norm = np.linalg.norm(excitation_spectra.mean(axis=0), axis=1)
+    excitation_norm = _compute_norm(_compute_spectra(excitation.samples, starts, length))
     if not excitation_norm.max() > 1e-9 * max(
         float(np.nanmax(np.abs(excitation.samples[segment.start : segment.stop]))), 1e-300
     ):
@@ -119,11 +118,29 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
         noise = smooth_over_lines(compute_period_variance(spectra[1]), SMOOTHING_LINES) / len(starts)
     else:
         noise = estimate_local_noise(command, response)
-    if transient:  # a line without power between excited lines counts as excited too
-        excitation_norm = np.sqrt(smooth_over_lines(excitation_norm**2, SMOOTHING_LINES))
     frequency_hz = np.arange(1, len(command) + 1) * rate_hz / length
-    excited = excitation_norm > LEAST_EXCITED_AMPLITUDE * excitation_norm.max()
+    if transient:
+        # A line without power between excited lines counts as excited, too; one to which power only leaks does not.
+        tapered_norm = _compute_norm(_compute_spectra(excitation.samples, starts, length, tapered=True))
+        excited = _find_strong_lines(_smooth(excitation_norm)) & _find_strong_lines(_smooth(tapered_norm))
+    else:
+        excited = _find_strong_lines(excitation_norm)
     return SegmentLines(frequency_hz, command, response, noise, excited, transient, rate_hz, recording.hold)
+
+
+def _compute_norm(spectra: ComplexArray) -> FloatArray:
+    """Compute the norm (lines,) over channels of the mean over periods of spectra (periods, lines, channels)."""
+    return np.asarray(np.linalg.norm(spectra.mean(axis=0), axis=1))
+
+
+def _smooth(norm: FloatArray) -> FloatArray:
+    """Smooth magnitudes (lines,) over `SMOOTHING_LINES` lines."""
+    return np.sqrt(smooth_over_lines(norm**2, SMOOTHING_LINES))
+
+
+def _find_strong_lines(norm: FloatArray) -> BoolArray:
+    """Find the lines (lines,) whose magnitude exceeds `LEAST_EXCITED_AMPLITUDE` of the largest."""
+    return np.asarray(norm > LEAST_EXCITED_AMPLITUDE * norm.max())
 
 
 def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
@@ -226,14 +243,14 @@ def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[in
 
 def _compute_spectra(samples: FloatArray, starts: Sequence[int], length: int, tapered: bool = False) -> ComplexArray:
     """Compute the spectra (periods, lines, channels) of the samples without the mean of each period, one period per
-    start. tapered: whether to apply a Hann window, so that ends that differ are no excitation of all lines (leakage);
-    not where that would remove most of the power, such as that of a pulse near an end. Those of a constant channel are
-    exactly 0."""
+    start. tapered: whether to apply a sine window, so that ends that differ are no excitation of all lines (leakage);
+    not where that would remove most of the power, such as that of a pulse near an end. (A Hann window would remove the
+    lines at both ends of a sweep.) Those of a constant channel are exactly 0."""
     periods = np.stack([samples[start : start + length] - samples[start] for start in starts])
     centred_periods = periods - periods.mean(axis=1, keepdims=True)
     if tapered:
-        window = np.hanning(length)[:, None]
+        window = np.sin(np.pi * (np.arange(length)[:, None] + 0.5) / length)
         tapered_periods = (periods - np.sum(window * periods, axis=1, keepdims=True) / window.sum()) * window
-        if np.sum(tapered_periods**2) > HANN_POWER / 2 * np.sum(centred_periods**2):
+        if np.sum(tapered_periods**2) > TAPER_POWER / 2 * np.sum(centred_periods**2):
             return compute_line_spectra(tapered_periods)
     return compute_line_spectra(centred_periods)

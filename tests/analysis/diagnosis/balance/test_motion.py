@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.band import compute_band_begin_hz
 from analysis.diagnosis.balance.laws.motion_laws import make_laws
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signals
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.limits import HIGHEST_BAND_END_RATIO
+from analysis.diagnosis.limits import ACCELERATION_NOISE_SHARE, HIGHEST_BAND_END_RATIO
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import Signal
 
@@ -172,3 +173,16 @@ def test_gravity_in_a_measured_acceleration_moves_nothing(record_samples):
     assert tilted.position == pytest.approx(level.position, abs=1e-9)
     assert tilted.velocity == pytest.approx(level.velocity, abs=1e-9)
     assert tilted.decimate(tilted.acceleration) == pytest.approx(level.decimate(level.acceleration), abs=1e-9)
+
+
+@pytest.mark.parametrize("noise_share", [0.01, 0.03, 0.1])
+def test_the_band_of_a_noisy_acceleration_begins_where_its_double_integral_is_noise(noise_share):
+    random, lines_hz, t = np.random.default_rng(3), np.arange(5.0, 20.0, 0.5), np.arange(40_000) / RATE_HZ
+    acceleration = np.cos(2 * np.pi * np.outer(t, lines_hz) + random.uniform(0, 2 * np.pi, len(lines_hz))).sum(axis=1)
+    noise_rms = noise_share * acceleration.std()
+    frequency_hz = np.fft.rfftfreq(4096, 1 / RATE_HZ)[1:]
+    noise_power = frequency_hz[0] * noise_rms**2 / (RATE_HZ / 2) * frequency_hz**-4.0
+    largest_noise_power = ACCELERATION_NOISE_SHARE * np.sum(0.5 * lines_hz**-4.0)
+    is_usable = np.cumsum(noise_power[::-1])[::-1] <= largest_noise_power
+    noisy = acceleration + noise_rms * random.normal(size=len(t))
+    assert compute_band_begin_hz([noisy[:, None]], RATE_HZ) == frequency_hz[np.flatnonzero(is_usable)[0]]

@@ -189,14 +189,16 @@ def test_a_shortened_simulation_keeps_the_restarts_of_the_records_that_it_keeps(
     assert replace(measure, restarts=()).shorten().restarts == ()
 
 
-@pytest.mark.parametrize("place", [0.0, 9.81])
+@pytest.mark.parametrize(("place", "lost_samples"), [(0.0, 0), (9.81, 0), (0.0, 3)])
 def test_a_reading_that_never_changes_says_nothing_of_the_noise_of_others(
-    drifting_recording: Recording, place: float
+    drifting_recording: Recording, place: float, lost_samples: int
 ) -> None:
     read = drifting_recording.response
     noise = 0.01 * read.samples.std() * np.random.default_rng(3).standard_normal(read.samples.shape)
     moving = replace(drifting_recording, response=replace(read, samples=read.samples + noise))
-    resting = replace(drifting_recording, response=replace(read, samples=np.full_like(noise, place)))
+    rest = np.full_like(noise, place)
+    rest[:lost_samples] = np.nan
+    resting = replace(drifting_recording, response=replace(read, samples=rest))
     alone, both = (make_measure(each, make_model(400.0)).measure for each in ([moving], [moving, resting]))
     assert isinstance(alone, FreeSimulation) and isinstance(both, FreeSimulation)
     assert alone.noise == pytest.approx(noise.std(), rel=0.1)

@@ -173,3 +173,30 @@ def test_the_noise_is_capped_by_the_force_that_is_compared_and_not_by_that_at_th
     compared = record.fit | record.choose | record.test
     assert np.std(record.measured) > 3 * np.std(record.measured[compared])
     assert measure.noise[0] == pytest.approx(np.std(record.measured[compared]), rel=0.01)
+
+
+TWO_BODIES = MechanicalModel("two", "position", 2 * np.eye(2), 5 * np.eye(2), 300 * np.eye(2), np.eye(2), np.eye(2))
+
+
+def record_driven_axis(axis: int, noise_m: float) -> Recording:
+    """Of two uncoupled bodies, the one that is driven; the other reads exactly 0."""
+    command, read = np.zeros((4000, 2)), np.zeros((4000, 2))
+    command[:, axis] = 3 * np.sin(2 * np.pi * 1.1 * TIME_S)
+    moved = simulate_mechanism(TWO_BODIES, command, RATE_HZ).response[:, axis]
+    read[:, axis] = moved + noise_m * np.random.default_rng(axis).standard_normal(4000)
+    signals = (Signal(each, RATE_HZ, what, "1", ("x", "y")) for each, what in ((command, "force"), (read, "position")))
+    return Recording("two", *signals)
+
+
+def test_an_axis_at_rest_says_nothing_of_the_noise_of_its_force() -> None:
+    records = [record_driven_axis(axis, 3e-4) for axis in (0, 1)]
+    alone = [make_force_measure([record], TWO_BODIES, 10.0).measure.noise[axis] for axis, record in enumerate(records)]
+    in_turn = make_force_measure(records, TWO_BODIES, 10.0).measure
+    assert in_turn.noise == pytest.approx(np.array(alone) / np.sqrt(2), rel=0.02)
+
+
+def test_a_recording_at_rest_does_not_widen_the_band() -> None:
+    moving = record_driven_axis(0, 3e-4)
+    held = replace(moving, response=replace(moving.response, samples=np.zeros((4000, 2))))
+    alone, both = (make_force_measure(each, TWO_BODIES, None).measure for each in ([moving], [moving, held]))
+    assert both.band_hz == alone.band_hz

@@ -89,6 +89,22 @@ def test_lines_to_which_the_command_only_leaks_are_not_excited(offset):
     assert 39.5 < excited_hz[-1] < 42.0
 
 
+@pytest.mark.parametrize("is_logarithmic", [False, True])
+def test_both_ends_of_a_sweep_are_excited(is_logarithmic):
+    share, low_hz, high_hz, duration_s = np.arange(10000) / 10000, 0.5, 100.0, 20.0
+    ratio = np.log(high_hz / low_hz)
+    cycles = (
+        low_hz
+        * duration_s
+        * (np.expm1(ratio * share) / ratio if is_logarithmic else share + (high_hz / low_hz - 1) * share**2 / 2)
+    )
+    command, part = np.sin(2 * np.pi * cycles)[:, None], Segment(0, 10000, "sweep")
+    lines = compute_segment_lines(recording(command, command, segments=(part,)), part)
+    excited_hz = lines.frequency_hz[lines.excited]
+    assert excited_hz[0] < 1.2 * low_hz
+    assert excited_hz[-1] > 0.88 * high_hz
+
+
 def test_a_pulse_at_the_beginning_excites_all_lines():
     command = np.zeros((3000, 1))
     command[1] = 1.0
