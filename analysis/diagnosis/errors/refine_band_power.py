@@ -9,7 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.band_power_fit import BandPowerFit, BandPowerProblem, fit_band_power, perturb
+from analysis.diagnosis.errors.band_power_fit import (
+    BandPowerFit,
+    BandPowerProblem,
+    evaluate_hypothesis,
+    fit_band_power,
+    perturb,
+)
 from analysis.diagnosis.errors.output_error import predict_decrease
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
@@ -26,8 +32,9 @@ LEAST_EXPECTED_GAIN = 0.02
 def refine_band_power(weighted_problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
     """Fit the hypothesis's and the model's parameters jointly, from `start`. The sensitivity to the model's parameters
     depends on the effects and is computed anew up to `MOST_LINEARISATIONS` times, while time is left. weighted_problem:
-    the problem with the chance variation of `start` (`weight_by_chance_variation`)."""
-    best = start
+    the problem with the chance variation of `start` (`weight_by_chance_variation`), under which the cost of `start` is
+    computed anew: fits are compared under the same weights."""
+    best = evaluate_hypothesis(weighted_problem, start.deviations, start.hypothesis)
     last_decrease = 0.0
     for _ in range(MOST_LINEARISATIONS):
         problem = replace(weighted_problem, jacobian_by_deviations=_differentiate_by_deviations(weighted_problem, best))

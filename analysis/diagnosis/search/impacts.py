@@ -31,7 +31,7 @@ from analysis.diagnosis.errors.hypothesis import (
     remove_claim,
 )
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
-from analysis.diagnosis.errors.refine_band_power import weight_by_chance_variation
+from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance_variation
 from analysis.diagnosis.limits import EXPLAINED_BY_CHANCE, IRREGULAR_ERROR, PEAKED_KURTOSIS
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
@@ -50,7 +50,6 @@ from analysis.diagnosis.search.second_effect_with_play import (
     RIVAL_EFFECT,
     SUFFICIENT_COST,
     SecondEffects,
-    refine_from,
     refine_weighted,
     search_second_effects,
 )
@@ -96,7 +95,7 @@ def explain_impacts(
         return None  # the band powers of the model without play differ from the recorded ones by chance alone
     if not time_left():
         return None
-    play_fit = refine_from(weighted_problem, axis_fits[0], time_left)
+    play_fit = refine_band_power(weighted_problem, axis_fits[0], time_left)
     rival_fits = list(axis_fits[1:])
     if RIVAL_EFFECT in effects_by_name:
         rival_claim = Claim(effects_by_name[RIVAL_EFFECT], "one", play_fit.hypothesis.claims[0].sites)

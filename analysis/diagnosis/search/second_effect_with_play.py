@@ -174,14 +174,7 @@ def _refine_fits(
 
 def refine_weighted(problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
     """Refine a fit under the weights of its own chance variation."""
-    return refine_from(weight_by_chance_variation(problem, start), start, time_left)
-
-
-def refine_from(weighted_problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
-    """Refine a fit under new weights, the chance variation of its start: first the cost of the start is computed under
-    these, because a refinement must not be compared with a cost under others."""
-    weighted_start = evaluate_hypothesis(weighted_problem, start.deviations, start.hypothesis)
-    return refine_band_power(weighted_problem, weighted_start, time_left)
+    return refine_band_power(weight_by_chance_variation(problem, start), start, time_left)
 
 
 def _evaluate_starts(

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import analysis.diagnosis.errors.refine_band_power as refine_module
 import analysis.diagnosis.search.impacts as impacts
 import analysis.diagnosis.search.second_effect_with_play as second_effect
 import analysis.diagnosis.search_by_simulation as search_by_simulation
@@ -114,9 +115,12 @@ def test_beside_what_waveforms_and_band_powers_show_only_relatives_are_tried(tru
 
 
 def test_a_refinement_is_compared_with_its_start_under_the_same_weights(true_level, monkeypatch):
-    monkeypatch.setattr(second_effect, "refine_band_power", lambda problem, start, time_left: start)
+    monkeypatch.setattr(refine_module, "evaluate_hypothesis", second_effect.evaluate_hypothesis)
+    monkeypatch.setattr(refine_module, "replace", lambda problem, **changes: problem)
+    monkeypatch.setattr(refine_module, "_differentiate_by_deviations", lambda problem, fit: None)
+    monkeypatch.setattr(refine_module, "fit_band_power", lambda problem, best, steps: best)
     start = SimpleNamespace(hypothesis=friction(1.0), deviations=np.zeros(0), cost=50.0)
-    assert second_effect.refine_from(VIEW, start, CountedBudget(9)).cost == pytest.approx(1.0)
+    assert refine_module.refine_band_power(VIEW, start, CountedBudget(9)).cost == pytest.approx(1.0)
 
 
 def test_of_each_effect_only_its_best_start_is_kept(true_level):
@@ -203,14 +207,14 @@ def test_where_chance_alone_explains_the_band_powers_play_is_not_refined(recorde
     def refuse(problem, start, time_left):
         raise RefinedError
 
-    monkeypatch.setattr(impacts, "refine_from", refuse)
+    monkeypatch.setattr(impacts, "refine_band_power", refuse)
     monkeypatch.setattr(impacts, "weight_by_chance_variation", lambda problem, fit: replace(problem, spread=spread))
     with pytest.raises(RefinedError) if refined else contextlib.nullcontext():
         assert impacts.explain_impacts(*recorded, CATALOGUE) is None
 
 
 def test_play_is_not_refined_once_the_time_has_ended(recorded, monkeypatch):
-    monkeypatch.setattr(impacts, "refine_from", None)
+    monkeypatch.setattr(impacts, "refine_band_power", None)
     assert impacts.explain_impacts(*recorded, CATALOGUE, CountedBudget(0)) is None
 
 
