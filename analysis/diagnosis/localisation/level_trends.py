@@ -7,7 +7,6 @@ variation between periods; external noise does not depend on the level.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +18,6 @@ from equalizer.signals.signal import FloatArray
 
 _LEAST_AMPLITUDE = 1e-300
 """Lower limit of an amplitude, so that its logarithm is finite."""
-_WHOLE_BAND: Band = (0.0, np.inf)
-"""Band (Hz) that stands for the whole driven band in a `_Group`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,33 +57,21 @@ class LevelTrend:
         return "rises from nothing" if self.from_nothing else "rises"
 
 
-class _Group(NamedTuple):
-    """Distortions that differ in their level only; the fields are those of `LevelTrend`."""
-
-    output: str
-    quantity: str
-    input: str
-    band_hz: Band
-    whole_band: bool
-    kind: Kind
-
-
 def compute_level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
     """Compute the trend of each output, input, band and kind. cells: distortions at all levels."""
-    cells_by_group: dict[_Group, list[Distortion]] = {}
+    cells_by_group: dict[tuple[object, ...], list[Distortion]] = {}
     for cell in cells:
-        # Realisations differ slightly in the band that they drive.
-        band = _WHOLE_BAND if cell.whole_band else cell.band_hz
-        group = _Group(cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
+        # Realisations differ slightly in the whole band that they drive.
+        band = None if cell.whole_band else cell.band_hz
+        group = cell.output, cell.quantity, cell.input, band, cell.kind
         cells_by_group.setdefault(group, []).append(cell)
     return tuple(
-        _compute_trend(group, sorted(group_cells, key=lambda cell: cell.amplitude))
-        for group, group_cells in cells_by_group.items()
+        _compute_trend(sorted(group_cells, key=lambda cell: cell.amplitude)) for group_cells in cells_by_group.values()
     )
 
 
-def _compute_trend(group: _Group, cells: Sequence[Distortion]) -> LevelTrend:
-    """Compute the trend of one group. cells: its distortions, by rising level."""
+def _compute_trend(cells: Sequence[Distortion]) -> LevelTrend:
+    """Compute the trend of distortions that differ in their level only, by rising level."""
     distortion_rms = np.array([max(cell.rms, cell.limit_rms) for cell in cells])
     signal_rms = np.array([cell.signal_rms for cell in cells])
     levels = np.array([cell.amplitude for cell in cells])
@@ -94,10 +79,13 @@ def _compute_trend(group: _Group, cells: Sequence[Distortion]) -> LevelTrend:
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
     is_significant = np.array([cell.p_value < DISTORTION_P for cell in cells])
     slope = _estimate_slope(levels, relative_db, np.array([cell.lines for cell in cells]), is_significant)
-    if group.whole_band:
-        band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
-        group = group._replace(band_hz=band)
-    return LevelTrend(*group, p_value, slope, bool(is_significant.any() and not is_significant[0]))
+    band_hz = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
+    from_nothing = bool(is_significant.any() and not is_significant[0])
+    any_cell = cells[0]
+    return LevelTrend(
+        any_cell.output, any_cell.quantity, any_cell.input, band_hz, any_cell.whole_band, any_cell.kind,
+        p_value, slope, from_nothing,
+    )  # fmt: skip
 
 
 def _estimate_slope(
