@@ -16,9 +16,9 @@ from matplotlib.patches import Patch
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, create_figure, draw_no_data_note, style_axes
-from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.octave_bins import OctaveBins, average_octave_bins
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 
 _BIN_WIDTH_OCTAVES = 1 / 24
 """Width of a bin in which lines are averaged for drawing, octaves. Chosen; the caption states it."""

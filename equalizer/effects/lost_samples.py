@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.logger_kernel import BoolArray, repeat_likely_losses, repeat_lost_samples
+from equalizer.effects.simulation.logger_kernel import repeat_likely_losses, repeat_lost_samples
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import BoolArray, FloatArray
 
 DISTINGUISHABLE_SIGMA = 4.0
 """Difference of two successive samples, over the noise, above which a repeated sample is distinguishable. Chosen, as

@@ -14,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.signals.resampling import Grid, Samples, resample
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import BoolArray, FloatArray
 
 IntArray = npt.NDArray[np.signedinteger]
-BoolArray = npt.NDArray[np.bool_]
 
 LEAST_CORRELATION = 0.5
 """Least |r| at which an offset is accepted. Chosen, like all constants here without another reason."""

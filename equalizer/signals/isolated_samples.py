@@ -15,12 +15,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from equalizer.signals.recording import Hold, Recording
-from equalizer.signals.signal import FloatArray, Signal
-
-BoolArray = npt.NDArray[np.bool_]
+from equalizer.signals.signal import BoolArray, FloatArray, Signal
 
 HALF_WINDOW = 8
 """Number of samples on either side of a tested sample; near an end the window is shifted. Chosen, like the degree, the

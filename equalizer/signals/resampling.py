@@ -11,11 +11,9 @@ from fractions import Fraction
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import BoolArray, FloatArray
 
-BoolArray = npt.NDArray[np.bool_]
 Method = Literal["held", "linear", "band-limited"]
 """Interpolation method; "held" is a zero-order hold."""
 

@@ -11,18 +11,15 @@ where y is the measurement, x_k the simulated sample, and x_before the last samp
 """
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit, types
 
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import BoolArray, FloatArray
 
 _OUTPUT_MATRIX = types.float64[:, ::1]
 _INPUT_MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _INPUT_VECTOR = types.Array(types.float64, 1, "C", readonly=True)
 _OUTPUT_MASK = types.boolean[::1]
 """Types of the kernels' arguments: inputs are read only."""
-
-BoolArray = npt.NDArray[np.bool_]
 
 
 @njit(

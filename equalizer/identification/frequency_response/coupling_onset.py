@@ -12,9 +12,9 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from equalizer.identification.frequency_response.coupling import compute_worst_coupling, require_square_response
-from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.local_polynomial import LocalPolynomial
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 
 _SMOOTHING_ORDER = 2
 """Order of the local polynomials by which the response is smoothed. Chosen."""

@@ -4,11 +4,9 @@ state-space models are fitted to it."""
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from equalizer.signals.signal import ComplexArray, FloatArray, list_per_channel
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray, list_per_channel
 
-BoolArray = npt.NDArray[np.bool_]
 """Array of truth values of any shape."""
 
 

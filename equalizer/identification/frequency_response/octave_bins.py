@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from equalizer.identification.frequency_response.frequency_response import BoolArray
-from equalizer.signals.signal import ComplexArray, FloatArray, find_runs
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray, find_runs
 
 _MIN_INDEPENDENCE = 0.1
 """Singular value to be exceeded by the smallest one of the matrix whose columns are the excited directions, each of

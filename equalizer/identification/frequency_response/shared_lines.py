@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.frequency_response.experiments import Experiment
-from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import (
     compute_period_variance,
     estimate_line_scatter,
     smooth_over_lines,
 )
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 
 _RANK_TOLERANCE = 1e-6
 """Singular value, relative to the largest at any line, below which it counts as zero (rounding)."""

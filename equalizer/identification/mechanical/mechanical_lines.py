@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import compute_period_variance, smooth_over_lines
 from equalizer.signals.recording import Hold, Recording, Segment
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra
 
 _RESIDUAL_FREEDOM = 8

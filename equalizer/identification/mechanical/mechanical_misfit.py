@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import smooth_over_lines
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines, have_same_lines
 from equalizer.identification.mechanical.mechanical_response import (
@@ -21,7 +20,7 @@ from equalizer.identification.mechanical.mechanical_response import (
 )
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 
 LARGEST_SCATTER = 0.25
 """Upper limit of the scatter that counts as noise, relative to a channel's largest response near a line; heuristic.

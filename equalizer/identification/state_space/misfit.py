@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import compute_model_response
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 
 NOISE_POWER_MARGIN = 1.1
 """Multiple of the noise power that counts as noise: only residual power above it is a misfit, because the noise itself
