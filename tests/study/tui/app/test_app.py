@@ -197,6 +197,7 @@ def test_an_engine_that_dies_leaves_a_panel_and_a_way_on(sitting, log, resumed):
     app = sitting(story)
     assert isinstance(app.outcome, Failed)
     assert app.outcome.error.saved == ("1 answer" if resumed else "Every answer that was given") + " is on disk."
+    assert log.read_text().count('"answer_given"') == 1
 
 
 def test_an_event_loop_that_hangs_frees_the_hand(sitting, log):
