@@ -15,7 +15,7 @@ import numpy as np
 from analysis.diagnosis.data.find_segments import find_segments
 from analysis.look.clock import describe_implausible_rate
 from equalizer.signals.recording import Hold, Recording, Segment
-from equalizer.signals.recording_checks import check_recording
+from equalizer.signals.recording_checks import check_recording, find_duplicates
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import NO_UNIT, UnknownUnitError, check_quantity, find_quantity, parse_unit
 from study.importing.alignment import Logger, align_signals
@@ -102,13 +102,17 @@ def build_recording(
         raise ImportRefusedError(subject, str(error)) from error
     if problems := check_recording(recording):
         raise ImportRefusedError(subject, "; ".join(problems))
-    notes = import_notes.list_sentences([part.label for part in planned_parts])
+    labels = [part.label for part in planned_parts]
+    notes = import_notes.list_sentences(labels)
+    measured_roles = ("command", "response")
+    samples = [[part.signals.columns[key] for key in units if key[0] in measured_roles] for part in parts]
     return BuiltRecording(
         recording,
         (
             *notes,
             *list_unit_remarks(import_map),
             *list_unused_segments(import_map, [(part.file.name, part.part.prefix) for part in planned_parts]),
+            *(f"{duplicate}." for duplicate in find_duplicates(samples, labels)),
             *filter(None, (_describe_rate_problem(recording), repetition_remark)),
         ),
     )

@@ -1,7 +1,7 @@
 """Make an incomplete import map for a file of which only the arrays are known, to be completed by the user.
 
-Clocks, channels and runs are proposed from names, units, shapes and data; `hold` and the segment are a common choice.
-Other unknown values are left empty or described in a comment.
+Clocks, channels and runs are proposed from names, units, shapes and data; `hold` is a common choice. Other unknown
+values are left empty or described in a comment.
 """
 
 import re
@@ -87,9 +87,10 @@ def _write_lines(all_arrays: Arrays) -> Iterator[str]:
     yield from _write_parts(run_groups.prefixes)
     yield from _write_ungrouped_runs(ungrouped_names, run_groups)
     yield ""
-    yield "[[segment]]"
-    yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
-    yield "split = { fit = 0.5, test = 0.5 }"
+    yield "# Without segments, periods that repeat are found, and the end of each part is held out for the test."
+    yield "# [[segment]]"
+    yield '# kind = "noise"          # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
+    yield "# split = { fit = 0.5, test = 0.5 }"
 
 
 def _find_ungrouped_runs(all_arrays: Arrays, run_groups: RunGroups) -> list[str]:
@@ -163,8 +164,7 @@ def _write_direction(roles: Mapping[str, str]) -> Iterator[str]:
 
 
 def _describe_excluded_array(name: str, array: Array) -> Iterator[str]:
-    """Describe, in a comment, an array that is not a channel: invalid, without numbers, constant, or of more than two
-    dimensions."""
+    """Describe, in a comment, an array that is no channel: invalid, not numeric, constant, of over two dimensions."""
     reason = find_unread_reason(array)
     if isinstance(reason, FaultyColumn):
         yield f"\n# Left out: {reason}"
@@ -174,7 +174,8 @@ def _describe_excluded_array(name: str, array: Array) -> Iterator[str]:
     elif array.size < LEAST_SAMPLES:
         yield f"\n# {name}: {_describe_shape(array.shape)}, a constant for expressions"
     else:
-        yield f"\n# {name}: {_describe_shape(array.shape)}; a channel is one row of it, as in {quote_name(name)}[0, 0]"
+        indices = ", ".join(":" if k == array.shape.index(max(array.shape)) else "0" for k in range(array.ndim))
+        yield f"\n# {name}: {_describe_shape(array.shape)}; a channel is one line: {quote_name(name)}[{indices}]"
 
 
 def _strip_value_suffix(name: str) -> str:

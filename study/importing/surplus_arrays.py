@@ -22,8 +22,11 @@ CLOCK_WORDS = {
     "tout", "date",
 }  # fmt: skip
 """Words in the name of a time column, in lower case."""
+_FIRST_UNNAMED_COLUMN = "column1"
+"""Name that a table without a header gives its first column."""
 _ROW_NUMBER_NAME = re.compile(
-    r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
+    rf"{_FIRST_UNNAMED_COLUMN}|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)"
+    r"[ _.]?(nr|no|number|#)?\.?",
     re.IGNORECASE,
 )
 """Name of a column of row numbers, or of a column without a name."""
@@ -61,14 +64,14 @@ def find_surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
 
 @np.errstate(all="ignore")
 def is_growing_time(name: str, array: Array) -> bool:
-    """Whether a numeric array (n,), n >= `LEAST_SAMPLES`, has a word of `CLOCK_WORDS` in its name, never decreases, and
-    ends above its start; coarse stamps may repeat. False with NaN."""
+    """Whether a numeric array (n,), n >= `LEAST_SAMPLES`, never decreases, ends above its start, and either has a word
+    of `CLOCK_WORDS` in its name (coarse stamps may repeat), or is the first column of a table without a header and has
+    even steps other than those of row numbers. False with NaN."""
     is_series = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
-    return (
-        is_series
-        and bool(split_name_words(name) & CLOCK_WORDS)
-        and bool((array[1:] >= array[:-1]).all() and array[-1] > array[0])
-    )
+    if not is_series or not bool((array[1:] >= array[:-1]).all() and array[-1] > array[0]):
+        return False
+    is_unnamed_time = name == _FIRST_UNNAMED_COLUMN and _has_even_steps(array) and not _is_row_number(name, array)
+    return bool(split_name_words(name) & CLOCK_WORDS) or is_unnamed_time
 
 
 def split_name_words(name: str) -> set[str]:
@@ -156,11 +159,13 @@ def has_time_line(array: Array) -> bool:
         return False
     lines = array if array.shape[0] < array.shape[1] else array.T
     is_growing = [bool((line[1:] > line[:-1]).all()) for line in lines]
-    steps = np.diff(lines[0].astype(float))
-    has_even_steps = bool(
-        np.ptp(steps) <= _MAX_STEP_RANGE * abs(np.median(steps))
-    )  # accepted even where all lines increase
-    return len(lines) > 1 and is_growing[0] and (has_even_steps or not all(is_growing))
+    return len(lines) > 1 and is_growing[0] and (_has_even_steps(lines[0]) or not all(is_growing))
+
+
+def _has_even_steps(times: Array) -> bool:
+    """Whether the steps of a time (n,) differ by at most `_MAX_STEP_RANGE`."""
+    steps = np.diff(times.astype(float))
+    return bool(np.ptp(steps) <= _MAX_STEP_RANGE * abs(np.median(steps)))
 
 
 @np.errstate(all="ignore")

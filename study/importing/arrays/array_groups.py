@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 _SEPARATORS = ("__", "/", ".", "_", " ")
@@ -30,11 +31,26 @@ class RunGroups:
 
 def find_runs(arrays: Mapping[str, npt.NDArray[Any]], min_samples: int) -> RunGroups:
     """Find the runs in a file, by the separator that gives the largest number of arrays in runs. Each run must contain
-    an array of at least `min_samples` values; without two such runs the result is empty. arrays: in the order of the
-    file, by name."""
+    an array of at least `min_samples` values; without two such runs the result is empty, and so it is where the first
+    two were recorded at the same time (`_are_simultaneous`). arrays: in the order of the file, by name."""
     long_array_names = [name for name, array in arrays.items() if array.size >= min_samples]
     candidates = [_group_arrays(tuple(arrays), long_array_names, separator) for separator in _SEPARATORS]
-    return max(candidates, key=lambda groups: len(groups.prefixes) * len(groups.names))
+    groups = max(candidates, key=lambda groups: len(groups.prefixes) * len(groups.names))
+    return RunGroups((), {}) if groups.prefixes and _are_simultaneous(arrays, groups) else groups
+
+
+def _are_simultaneous(arrays: Mapping[str, npt.NDArray[Any]], groups: RunGroups) -> bool:
+    """Whether the first two groups are parts of one run, such as the scopes of a Simulink model: both contain the same
+    rising times, and these do not begin at zero, where each of several runs may begin."""
+    first, second = groups.prefixes[:2]
+    for name in groups.names:
+        times = arrays[first + name]
+        is_rising = (
+            times.ndim == 1 and times.dtype.kind in "fiu" and len(times) > 1 and bool((np.diff(times) > 0).all())
+        )
+        if is_rising and times[0] != 0 and np.array_equal(times, arrays[second + name]):
+            return True
+    return False
 
 
 def _group_arrays(names: Sequence[str], long_names: Sequence[str], separator: str) -> RunGroups:

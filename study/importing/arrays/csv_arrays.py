@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from study.importing.arrays.table_cells import MISSING, Line, has_number, is_comment, is_number, is_text, split_row
 from study.importing.arrays.table_layout import TableLayout, find_layout
-from study.importing.arrays.table_marks import NO_THOUSANDS
+from study.importing.arrays.table_marks import NO_THOUSANDS, complete_rows_of_events
 from study.importing.arrays.table_text import read_text
 from study.importing.arrays.time_stamps import STAMP_NOTATIONS, is_stamp, join_stamps, read_stamps
 from study.importing.map_format.import_map import CsvMap
@@ -64,6 +64,7 @@ def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
 
 def parse_lines(lines: list[Line], settings: CsvMap) -> Table:
     """Read columns from the non-empty lines of a table. Raises ValueError with line and column of a problem."""
+    lines = list(complete_rows_of_events(lines, settings))
     layout = find_layout(lines, settings)
     if not layout.body:
         raise ValueError("it has a header, but no rows below it")

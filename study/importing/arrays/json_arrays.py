@@ -2,7 +2,8 @@
 
 Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
 record per line; https://jsonlines.org). Arrays inside an object have its name as prefix (`run1/u`), unless it is the
-only object with arrays of several values.
+only object with arrays of several values. Records that hold lists of several lengths are runs; their prefix is their
+number (`data/1/u`).
 """
 
 import re
@@ -100,6 +101,9 @@ def _find_arrays(value: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[
             yield from _find_arrays_in_object(value, key_path)
         case []:
             return
+        case [dict(), *_] if all(isinstance(record, dict) for record in value) and _are_runs(value):
+            for number, record in enumerate(value, start=1):
+                yield from _find_arrays_in_object(record, (*key_path, str(number)))
         case [dict(), *_] if all(isinstance(record, dict) for record in value):
             yield from (((*key_path, key), _make_array(column)) for key, column in _collect_columns(value).items())
         case _:
@@ -123,6 +127,21 @@ def _find_arrays_in_object(
         return
     for key, entry in value.items():
         yield from _find_arrays(entry, (*key_path, key))
+
+
+def _are_runs(records: list[dict[str, Any]]) -> bool:
+    """Whether each record holds a run: the lists under some key have several lengths, and so are no table."""
+    lengths_by_key: dict[str, set[int]] = {}
+    for record in records:
+        for key, entry in record.items():
+            if isinstance(entry, list) and entry and all(map(_is_number, entry)):
+                lengths_by_key.setdefault(key, set()).add(len(entry))
+    return any(len(lengths) > 1 for lengths in lengths_by_key.values())
+
+
+def _is_number(entry: Any) -> bool:
+    """Whether a JSON value is a number or a missing one."""
+    return entry is None or isinstance(entry, int | float)
 
 
 def _make_sibling_placeholder(entry: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:

@@ -11,6 +11,7 @@ from study.importing.arrays.table_cells import (
     count_filled_fields,
     find_first_number_row,
     has_number,
+    is_comment,
     is_empty,
     is_text,
     split_row,
@@ -78,6 +79,36 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
         _refuse_ambiguous_points(rows, sample, marks)
     delimiter = settings.delimiter or _guess_delimiter(sample, settings.decimal)
     return marks or TableMarks(delimiter, settings.decimal or ".")
+
+
+def complete_rows_of_events(rows: Sequence[Line], settings: CsvMap) -> Sequence[Line]:
+    """Give all rows as many fields as the header where its last columns hold words, and most rows lack them, as loggers
+    write events (`DAQ Pause`); other rows are unchanged. Only where a line without numbers, the header, and rows of
+    numbers have more fields than most rows, and all these surplus fields are words: they show which columns most rows
+    lack. Of several events in a row (`DAQ Pause, DAQ Stop`), those beyond the header are left out."""
+    for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS[:-1]:
+        widths = [0 if is_comment(text) else 1 + text.count(delimiter) for _, text in rows]
+        width = Counter(widths[len(widths) // 2 :]).most_common(1)[0][0] if widths else 1
+        wide_rows = [
+            split_row(text, delimiter)
+            for (_, text), row_width in zip(rows, widths, strict=True)
+            if row_width > width > 1
+        ]
+        has_numbers = [any(has_number(fields[:width], decimal) for decimal in ".,") for fields in wide_rows]
+        header_widths = {len(fields) for fields, is_data in zip(wide_rows, has_numbers, strict=True) if not is_data}
+        if (
+            len(header_widths) == 1
+            and any(has_numbers)
+            and all(is_text(field) for fields in wide_rows for field in fields[width:])
+        ):
+            surplus = header_widths.pop() - width
+            return [
+                (number, delimiter.join([*text.split(delimiter), *[""] * surplus][: width + surplus]))
+                if row_width >= width
+                else (number, text)
+                for (number, text), row_width in zip(rows, widths, strict=True)
+            ]
+    return rows
 
 
 def _select_number_rows(sample: Sequence[Line], marks: TableMarks) -> list[list[str]]:

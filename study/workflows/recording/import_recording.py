@@ -15,6 +15,7 @@ from typing import Any
 
 from equalizer.signals.joining import join_recordings, list_dropped_signals
 from equalizer.signals.recording import Recording
+from equalizer.signals.recording_checks import find_duplicates
 from study.errors import WrongUseError
 from study.importing.arrays.read_arrays import Arrays
 from study.importing.build_recording import build_recording
@@ -174,12 +175,14 @@ def _import_by_map(map_file: MapFile, files: Sequence[Path], on_progress: Progre
 
 def _import_by_found_map(folder: Path, on_progress: ProgressCallback) -> ForeignRecording:
     """Import a folder by the only map that fits it; without a fitting map, by the headers of its files. Raises
-    WrongUseError where its maps make several recordings."""
+    WrongUseError where its maps make several recordings, or a link in it leads to another of its files."""
     matching_maps = find_maps_for_folder(folder)
     if len(matching_maps) == 1:
+        _require_distinct(matching_maps[0].files)
         return _import_by_map(matching_maps[0].source, matching_maps[0].files, on_progress)
     if not matching_maps:
         header_map = make_map_from_headers(folder)
+        _require_distinct(header_map.files)
         arrays = read_without_map(header_map.files[0])
         return _import_by_header_map(header_map.source.map, arrays, header_map.files, on_progress)
     maps_text = "; ".join(
@@ -210,6 +213,8 @@ def _read_hapteq_recordings(files: Sequence[Path]) -> ForeignRecording:
     notes = [f"{len(files)} recordings were put one after another; time stamps were left out."]
     if dropped_signals := list_dropped_signals(recordings):
         notes.append(f"Left out, because not every recording has it: {', '.join(dropped_signals)}.")
+    samples = [(recording.command.samples, recording.response.samples) for recording in recordings]
+    notes += [f"{duplicate}." for duplicate in find_duplicates(samples, [path.name for path in files])]
     return ForeignRecording(joined_recording, tuple(files), "recording", "", tuple(notes))
 
 

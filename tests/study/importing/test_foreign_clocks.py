@@ -202,3 +202,11 @@ def test_the_mend_that_is_said_of_a_clock_mends_it(tmp_path, time, unit, step, n
     (tmp_path / "map.toml").write_text(f'device = "rig"\nhold = "zero-order"\n{clock}{channels}')
     found = read_foreign((path,), str(tmp_path / "map.toml")).recording
     assert (found.sample_rate_hz, len(found)) == (pytest.approx(1 / step), len(time))
+
+
+@pytest.mark.parametrize(("step_s", "is_time"), [(0.001, True), (1.0, False)])
+def test_an_even_first_column_without_a_name_is_proposed_as_time_unless_it_numbers_the_rows(tmp_path, step_s, is_time):
+    (tmp_path / "a.txt").write_text("".join(f"{step_s * k:g} {(-1) ** k} {k % 5}\n" for k in range(40)))
+    skeleton = make_map_skeleton(read_arrays(tmp_path / "a.txt", CsvMap()))
+    assert ('time = "column1"' in skeleton) == is_time
+    assert skeleton.count("[[channel]]") == 3 - is_time

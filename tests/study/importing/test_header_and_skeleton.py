@@ -136,7 +136,8 @@ def test_a_skeleton_names_every_array_and_is_refused_until_it_is_complete(tmp_pa
     held = Arrays(
         tmp_path / "a.npz",
         {"drive_t_ms": np.arange(99.0), "speed": np.ones(99), "daq_time": np.arange(120.0), "y": np.ones((3, 120)),
-         "force [N]": np.ones(120), "gain": np.array(3.0), "note": np.array("x"), "cube": np.ones((3, 3, 3))},
+         "force [N]": np.ones(120), "gain": np.array(3.0), "note": np.array("x"), "cube": np.ones((3, 3, 3)),
+         "runs": np.ones((120, 3, 2))},
     )  # fmt: skip
     text = make_map_skeleton(held)
     for words in (
@@ -147,7 +148,8 @@ def test_a_skeleton_names_every_array_and_is_refused_until_it_is_complete(tmp_pa
         'unit = "N"',
         "# note holds no numbers",
         'clock = "daq_time"',
-        "# cube: 3 x 3 x 3 samples; a channel is one row",
+        "# cube: 3 x 3 x 3 samples; a channel is one line",
+        "# runs: 120 x 3 x 2 samples; a channel is one line: runs[:, 0, 0]",
     ):
         assert words in text
     with pytest.raises(UnusableFileError) as refused:
@@ -159,12 +161,10 @@ def test_a_skeleton_names_every_array_and_is_refused_until_it_is_complete(tmp_pa
 def test_a_completed_skeleton_is_a_map(tmp_path):
     held = Arrays(tmp_path / "a.npz", {"fs": np.array(100.0), "u": np.ones(50), "y": np.ones(50)})
     first, _, second = make_map_skeleton(held).partition('name = "y"')
-    complete = (
-        first.replace('device = ""', 'device = "rig"').replace('role = "" ', 'role = "command" ', 1)
-        .replace('role = "" ', 'role = "response" ', 1) + 'name = "y"' + second
-    )  # fmt: skip
+    first = first.replace('device = ""', 'device = "rig"').replace('role = "" ', 'role = "command" ', 1)
+    complete = first.replace('role = "" ', 'role = "response" ', 1) + 'name = "y"' + second
     found = parse_map(complete, tmp_path / "m.toml")
-    assert found.clock[0].rate == "fs"
+    assert found.clock[0].rate == "fs" and found.segment == ()  # without segments, periods that repeat are found
     assert [(channel.role, channel.name) for channel in found.channel] == [("command", "u"), ("response", "y")]
 
 

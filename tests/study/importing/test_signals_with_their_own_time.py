@@ -82,6 +82,16 @@ def test_several_structures_are_numbered(tmp_path):
     assert 'value = "scope.signals.1.values"' in proposed(tmp_path / "a.mat")
 
 
+@pytest.mark.parametrize(("start_s", "are_runs"), [(34.26, False), (0.0, True)])
+def test_scopes_of_one_recording_are_no_runs(tmp_path, start_s, are_runs):
+    """Runs may each begin at zero; at another time only what was recorded at once begins together."""
+    scopes = {f"scope{number}": signal(SLOW + start_s, number * FORCE) for number in (1, 2)}
+    savemat(tmp_path / "a.mat", scopes)
+    text = proposed(tmp_path / "a.mat")
+    assert ("[[part]]" in text) == are_runs
+    assert ('value = "scope2.signals.values"' in text) != are_runs
+
+
 def element(kind, content):
     return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)
 

@@ -10,6 +10,7 @@ from study.importing.arrays.read_arrays import read_arrays
 from study.importing.header_map import describe_header_choices, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
+from study.importing.map_skeleton import make_map_skeleton
 
 TIME, FORCE = [0.0, 0.1, 0.2], [1, None, 2.5]
 RECORDS = [{"t": t, "u": u} for t, u in zip(TIME, FORCE, strict=True)]
@@ -102,6 +103,20 @@ def test_what_cannot_be_read_is_refused_in_words(tmp_path, content, said):
     with pytest.raises(ImportRefusedError) as refused:
         read(tmp_path, content)
     assert said in str(refused.value.happened)
+
+
+def test_records_that_hold_lists_of_several_lengths_are_runs(tmp_path):
+    rollouts = [{"kind": "step", "u": list(range(count)), "y": [0.5] * count} for count in (20, 30)]
+    arrays = read(tmp_path, {"config": {"rate_hz": 50}, "data": rollouts})
+    assert {name: len(array) for name, array in arrays.by_name.items() if array.ndim} == {
+        "data/1/u": 20, "data/1/y": 20, "data/2/u": 30, "data/2/y": 30,
+    }  # fmt: skip
+    assert [f'prefix = "data/{run}/"' in make_map_skeleton(arrays) for run in (1, 2)] == [True, True]
+
+
+def test_records_that_hold_vectors_of_one_length_are_a_table(tmp_path):
+    found = read(tmp_path, [{"t": t, "imu": [t, 2.0, 3.0]} for t in TIME]).by_name
+    assert (found["t"].tolist(), found["imu"].shape) == (TIME, (3, 3))
 
 
 def test_a_document_of_ours_is_told_from_a_table(tmp_path):

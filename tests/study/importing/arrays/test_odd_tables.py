@@ -130,6 +130,33 @@ def test_a_row_below_that_holds_numbers_is_refused(tmp_path, row):
         read(tmp_path, f"{table(';', '')}{row}\n".replace("2;\n", "2\n"))
 
 
+LOGGED = (
+    "Rate: 10\nNo, time [s], force [N], Events\n1, 0, 1.5, started\n2, 0.1, -2\n3, 0.2, 3, paused, stopped\n4, 0.3, 4\n"
+)
+
+
+def test_events_at_the_ends_of_some_rows_are_a_column_of_words(tmp_path):
+    found = read(tmp_path, LOGGED)
+    assert list(found.by_name) == ["No", "time [s]", "force [N]"]
+    np.testing.assert_array_equal(found.by_name["force [N]"], [1.5, -2, 3, 4])
+    assert any("'Events' holds words" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        LOGGED.replace(", started", "").replace(", paused, stopped", ""),  # the header may name a column too many
+        LOGGED.replace(", Events", ""),
+        LOGGED.replace("paused", "7"),
+        LOGGED.replace("4, 0.3, 4", "4, 0.3"),
+        LOGGED + "5, 0.4, 5, stopped, 7\n",
+    ],
+)
+def test_rows_are_not_completed_by_guess(tmp_path, text):
+    with pytest.raises(ImportRefusedError, match="Line [0-9]+ has [0-9] fields"):
+        read(tmp_path, text)
+
+
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])
 @pytest.mark.parametrize("above", ["", "Rig 3\n", "# Rig 3\n"])
 @pytest.mark.parametrize("end", ["", "{}"])

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -128,12 +130,9 @@ def test_of_a_folder_of_other_names_it_is_said_that_they_are_no_parts(tmp_path):
 
 
 def test_of_recordings_put_one_after_another_it_is_said_which_signals_were_left_out(tmp_path):
-    force = Signal(np.ones((8, 1)), 1000.0, "force", "N", ("fx",))
-    response = Signal(np.ones((8, 1)), 1000.0, "acceleration", "m/s^2", ("ax",))
-    position = Signal(np.zeros((8, 1)), 1000.0, "position", "m", ("x",))
-    for name in ("a.h5", "c.h5"):
-        write_recording(tmp_path / name, Recording("rig", force, response, position=position))
-    write_recording(tmp_path / "b.h5", Recording("rig", force, response))
+    for name, gain in (("a.h5", 1.0), ("b.h5", 2.0), ("c.h5", 3.0)):
+        position = None if name == "b.h5" else Signal(0 * T[:, None], 1000.0, "position", "m", ("x",))
+        write_recording(tmp_path / name, replace(recording(gain=gain), position=position))
     files = (tmp_path / "a.h5", tmp_path / "b.h5")
     done = import_recording(ImportPlan(files, None, tmp_path / "r.h5"))
     assert done.recording.position is None
@@ -162,14 +161,15 @@ def test_a_folder_of_several_recordings_asks_which(tmp_path):
         import_recording(ImportPlan((tmp_path,), None, tmp_path / "r.h5"))
 
 
-def recording(rate_hz=1000.0):
-    one = Signal(T[:, None], rate_hz, "force", "N", ("fx",))
-    return Recording("rig", one, Signal(T[:, None], rate_hz, "acceleration", "m/s^2", ("ax",)), meta={"grip": "weak"})
+def recording(rate_hz=1000.0, gain=1.0):
+    force = Signal(T[:, None], rate_hz, "force", "N", ("fx",))
+    response = Signal(gain * T[:, None], rate_hz, "acceleration", "m/s^2", ("ax",))
+    return Recording("rig", force, response, meta={"grip": "weak"})
 
 
 def test_recordings_of_ours_are_taken_as_they_are_and_joined(tmp_path):
     write_recording(tmp_path / "a.h5", recording())
-    write_recording(tmp_path / "b.h5", recording())
+    write_recording(tmp_path / "b.h5", recording(gain=2.0))
     one = import_recording(ImportPlan((tmp_path / "a.h5",), None, tmp_path / "one.h5"))
     assert one.recording.meta["grip"] == "weak"
     two = import_recording(ImportPlan((tmp_path / "a.h5", tmp_path / "b.h5"), None, tmp_path / "two.h5"))
@@ -244,6 +244,29 @@ def test_a_file_that_is_given_twice_is_refused(tmp_path):
     ):
         with pytest.raises(WrongUseError, match="A file is given twice"):
             read_foreign(files, None if map_name is None else str(map_name))
+
+
+@pytest.mark.parametrize("has_map", [False, True])
+def test_of_a_folder_a_link_to_another_of_its_files_is_refused(tmp_path, has_map):
+    first = tmp_path / ("rec_1.mat" if has_map else "rec_1.csv")
+    if has_map:
+        savemat(first, {"data": {"u": T, "y": T, "fs": 1000.0}})
+        (tmp_path / "m.toml").write_text('files = ["rec_*.mat"]\n' + MAP)
+    else:
+        first.write_text(TABLE)
+    first.with_stem("rec_2").symlink_to(first)
+    with pytest.raises(WrongUseError, match=r"A file is given twice.*rec_2"):
+        read_foreign((tmp_path,), None)
+
+
+def test_of_a_copy_it_is_said_that_it_counts_twice(tmp_path):
+    write_recording(tmp_path / "a.h5", recording())
+    import_recording(ImportPlan((tmp_path / "a.h5",), None, tmp_path / "copy.h5"))
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text(TABLE)
+    for first, second in (("a.h5", "copy.h5"), ("a.csv", "b.csv")):
+        notes = read_foreign((tmp_path / first, tmp_path / second), None).notes
+        assert f"{second} holds the same samples as {first}, and a recording counts once: leave it out." in notes
 
 
 def test_a_link_to_itself_is_a_file_that_cannot_be_read(tmp_path):
