@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.data.find_segments import find_segments
-from analysis.diagnosis.data.input_checks import require_different, require_usable_data
+from analysis.diagnosis.data.input_checks import require_usable_data
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, fill_gaps
-from analysis.diagnosis.data.observed_parts import LEAST_SAMPLES, find_parts
 from analysis.diagnosis.limits import BRIDGED_GAP_ERROR, LEAST_GAPLESS_SHARE
 from analysis.diagnosis.types import Mask
 from analysis.wording import begin_sentence, conjoin
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import LEAST_PART_SAMPLES, Recording, find_parts
 from equalizer.signals.signal import FloatArray, find_runs
 
 CONSTANT_RANGE = 1e-9
@@ -43,10 +42,9 @@ def prepare_recordings(
     accept_short: whether few cycles or samples are a remark instead of a refusal; None = the value of without_model.
     Raises NothingToDiagnoseError for unsuitable recordings."""
     # Imported on demand: trials of a session are not changed.
-    from equalizer.signals.isolated_samples import interpolate_isolated_samples
+    from equalizer.signals.isolated_samples import interpolate_all
 
-    interpolated, interpolation_texts = zip(*map(interpolate_isolated_samples, recordings), strict=True)
-    interpolation_remarks = _prefix_names(names, interpolation_texts)
+    interpolated, interpolation_remarks = interpolate_all(recordings, names)
     segment_results = [find_segments(recording) for recording in interpolated]
     repeat_remarks = _prefix_names(names, [text for _, text in segment_results])
     segmented_recordings = tuple(recording for recording, _ in segment_results)
@@ -75,7 +73,6 @@ def _prefix_names(names: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]
 def prepare_comparison(recordings: Sequence[Recording], names: Sequence[str], accept_short: bool) -> PreparedRecordings:
     """Prepare recordings by the last steps only (from the refusal on), for recordings that are prepared already, such
     as the trials of a session. Raises NothingToDiagnoseError for unsuitable recordings."""
-    require_different(recordings, names)
     weakness_remarks = tuple(
         f"{begin_sentence(problem)}." for problem in require_usable_data(recordings, names, accept_short)
     )
@@ -209,9 +206,9 @@ def _can_bridge(samples: FloatArray, gap_samples: int) -> bool:
 
 
 def _list_stretches_between_gaps(stretch: Stretch, gaps: Sequence[Stretch]) -> list[Stretch]:
-    """List the stretches between gaps that have at least `LEAST_SAMPLES` samples."""
+    """List the stretches between gaps that have at least `LEAST_PART_SAMPLES` samples."""
     stretch_start, stretches = stretch[0], []
     for start, stop in (*gaps, (stretch[1], stretch[1])):
         stretches.append((stretch_start, min(max(start, stretch_start), stretch[1])))
         stretch_start = max(stop, stretch_start)
-    return [(start, stop) for start, stop in stretches if stop - start >= LEAST_SAMPLES]
+    return [(start, stop) for start, stop in stretches if stop - start >= LEAST_PART_SAMPLES]

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import find_parts
 from analysis.diagnosis.noise.rounding import find_rounding_step
 from analysis.look.channels import Channel, Stretch, compute_rms, list_channels
 from analysis.look.check import Check
@@ -32,7 +31,7 @@ from analysis.look.levels import SegmentLevel, check_proportionality, compute_se
 from analysis.look.plausibility import check_offsets, check_units
 from analysis.look.repeats import Repeats, check_repeats, find_repeats
 from analysis.wording import replace_time_units
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, find_parts
 from equalizer.signals.recording_checks import find_length_problems, find_segment_problems
 from equalizer.signals.summary import Summary, SummaryDisplay
 

@@ -66,6 +66,20 @@ def interpolate_isolated_samples(recording: Recording) -> tuple[Recording, str]:
     return replace(recording, response=response, position=position), remark
 
 
+def interpolate_all(
+    recordings: Sequence[Recording], names: Sequence[str] = ()
+) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """Interpolate the isolated samples of several recordings; returns them, and a sentence for each that was changed,
+    with its name where there are several. names: empty = recording 1, recording 2 and so on."""
+    names = names or [f"recording {number}" for number in range(1, len(recordings) + 1)]
+    changes = [interpolate_isolated_samples(recording) for recording in recordings]
+    return tuple(recording for recording, _ in changes), tuple(
+        text if len(recordings) == 1 else f"{name}: {text}"
+        for name, (_, text) in zip(names, changes, strict=True)
+        if text
+    )
+
+
 def _mark_after_jumps(recording: Recording) -> BoolArray:
     """Mark the samples (n,) that may be the immediate response to a jump of a command: up to `HALF_WINDOW` after it,
     with the jump itself where the command is not held."""

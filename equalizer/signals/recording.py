@@ -7,7 +7,7 @@ Time convention: `response[k]` and `position[k]` are sampled at t_k, just before
 until t_(k+1) (`Hold.ZERO_ORDER`). Direct feedthrough of `command[k-1]` therefore appears in `response[k]`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -35,6 +35,9 @@ SEGMENT_KINDS = (
 binary signal, steps, impacts, free motion after a release, rest without a command."""
 SEGMENT_ROLES = ("fit", "test", "")
 """Use of a segment: to fit a model, to test it on held-out data, or (empty) as the identification decides."""
+
+LEAST_PART_SAMPLES = 32
+"""Least number of samples of a part; shorter ones are left out. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +114,30 @@ class Recording(SummaryDisplay):
                 ("segments", str(len(self.segments))),
             ),
         )
+
+
+def find_parts(recording: Recording) -> tuple[tuple[int, int], ...]:
+    """Find begin and end (exclusive) of each part with at least `LEAST_PART_SAMPLES`, as sample indices: a stretch that
+    was recorded without interruption. The whole recording where `meta` (key "parts") states no such part within it."""
+    stated_parts = recording.meta.get("parts")
+    stated_ranges = [
+        (int(stated_part["start"]), int(stated_part["stop"]))
+        for stated_part in (
+            stated_parts if isinstance(stated_parts, Sequence) and not isinstance(stated_parts, str) else ()
+        )
+        if isinstance(stated_part, dict) and "start" in stated_part and "stop" in stated_part
+    ]
+    long_parts = [
+        (start, stop)
+        for start, stop in stated_ranges
+        if start >= 0 and stop <= len(recording) and stop - start >= LEAST_PART_SAMPLES
+    ]
+    return tuple(long_parts) or ((0, len(recording)),)
+
+
+def list_segments(recording: Recording) -> tuple[Segment, ...]:
+    """List the segments; where none are stated, one of noise for each part (`find_parts`)."""
+    return recording.segments or tuple(Segment(start, stop, "noise") for start, stop in find_parts(recording))
 
 
 def _format_channels(signal: Signal) -> str:

@@ -2,10 +2,11 @@
 
 `study.store.formats.recording_file` and `study.importing.build_recording` call `check_recording` when they read or
 import a recording. Identification, fits and diagnosis call `list_recording_problems`, because a recording may also be
-made of arrays, and `find_unusable_channels`.
+made of arrays, and `find_unusable_channels`. An import calls `find_duplicates`, too.
 """
 
 from collections.abc import Iterator, Sequence
+from hashlib import sha256
 from numbers import Integral
 
 import numpy as np
@@ -26,14 +27,39 @@ def check_recording(recording: Recording) -> tuple[str, ...]:
 
 
 def list_recording_problems(recordings: Sequence[Recording], names: Sequence[str] = ()) -> tuple[str, ...]:
-    """List the problems of `check_recording`, and units outside SI (a file's are converted when it is read); a sentence
-    each, with the recording's name where there are several. names: empty = recording 1, recording 2 and so on."""
+    """List the problems of `check_recording`, and units outside SI (a file's are converted when it is read); without
+    any, the duplicates (`find_duplicates`). A sentence each, with the recording's name where there are several. names:
+    empty = recording 1, recording 2 and so on."""
     names = names or [f"recording {number}" for number in range(1, len(recordings) + 1)]
-    return tuple(
+    problems = tuple(
         problem if len(recordings) == 1 else f"{name}: {problem}"
         for recording, name in zip(recordings, names, strict=True)
         for problem in (*check_recording(recording), *_find_foreign_units(recording))
     )
+    # Those that differ in rate, hold, channels or units are refused for that, by the callers.
+    contents = [
+        (
+            (repr(each.sample_rate_hz), each.hold.value, format_channels(each.command), format_channels(each.response)),
+            each.command.samples,
+            each.response.samples,
+        )
+        for each in recordings
+    ]
+    return problems or tuple(find_duplicates(contents, names))
+
+
+def find_duplicates(contents: Sequence[Sequence[npt.ArrayLike]], names: Sequence[str]) -> Iterator[str]:
+    """Find recordings with the same content as an earlier one, as of a file that is given twice: they would count
+    twice, and a model would be tested by the data that it was fitted to. Yields a sentence per such recording.
+    contents: of each, its commands and responses."""
+    if len(contents) < 2:
+        return
+    first_names: dict[bytes, str] = {}
+    for arrays, name in zip(contents, names, strict=True):
+        digest = sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).digest()
+        if digest in first_names:
+            yield f"{name} holds the same samples as {first_names[digest]}, and a recording counts once: leave it out"
+        first_names.setdefault(digest, name)
 
 
 def _find_foreign_units(recording: Recording) -> Iterator[str]:

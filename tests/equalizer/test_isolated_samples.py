@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equalizer.signals.isolated_samples import interpolate_isolated_samples, replace_isolated_samples
+from equalizer.signals.isolated_samples import interpolate_all, interpolate_isolated_samples, replace_isolated_samples
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -86,6 +86,21 @@ def test_only_motions_are_changed_and_the_user_is_told():
     np.testing.assert_array_equal(changed.response.samples[:, 1], motion)
     assert np.isnan(changed.response.samples[2500, 0])
     assert np.nanmax(np.abs(changed.response.samples[:, 0] - motion)) < 0.06
+
+
+def test_of_several_recordings_each_is_reported_by_its_name():
+    motion = move(3) + 0.01 * np.random.default_rng(4).standard_normal(SAMPLES)
+    spiked = motion.copy()
+    spiked[1000:5000:1000] += 5.0
+    force = Signal(motion[:, None], RATE_HZ, "force", "N", ("fx",))
+    clean, noisy = (
+        Recording("device", force, Signal(samples[:, None], RATE_HZ, "position", "m", ("x",)))
+        for samples in (motion, spiked)
+    )
+    assert interpolate_all([noisy])[1][0].startswith("Isolated samples")
+    for names, prefix in (((), "recording 2: Isolated"), (("a", "b"), "b: Isolated")):
+        changed, remarks = interpolate_all([clean, noisy], names)
+        assert changed[0] is clean and len(remarks) == 1 and remarks[0].startswith(prefix)
 
 
 def test_flicker_of_one_of_several_encoders_at_rest_is_not_changed():

@@ -7,10 +7,10 @@ import numpy as np
 
 from analysis.diagnosis.data.measured_motion import fill_gaps
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.observed_parts import cut_part, find_parts
+from analysis.diagnosis.data.observed_parts import cut_part
 from analysis.diagnosis.limits import PART_LEAST_SAMPLES, PART_MOST_SAMPLES
 from analysis.diagnosis.types import Mask
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, find_parts
 from equalizer.signals.signal import FloatArray, Signal
 
 

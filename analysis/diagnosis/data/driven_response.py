@@ -12,8 +12,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from analysis.diagnosis.data.observed_parts import cut_part
 from analysis.diagnosis.limits import DRIVEN_COHERENCE, DRIVEN_DEVIATIONS
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, find_parts
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import hann, transform_windowed
 
@@ -97,15 +98,25 @@ def _can_predict(targets: FloatArray, signals: FloatArray, uses_future: bool) ->
 
 def _compute_spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:
     """Compute the spectra (stretches, lines, commands) of the commands and (stretches, lines, responses) of the
-    responses; no stretches where each would have fewer than 16 samples, too few lines for a mean."""
+    responses; no stretches where each would have fewer than 16 samples, too few lines for a mean. Stretches are as long
+    as K of them permit, and none reaches from one part of a recording, where its signals jump, into the next."""
     command_count, response_count = len(recordings[0].command.channels), len(recordings[0].response.channels)
-    length = sum(len(recording) for recording in recordings) // (STRETCHES_PER_COMMAND * command_count)
-    pairs = (
-        [pair for recording in recordings for pair in _transform_stretches(recording, length)] if length >= 16 else []
-    )
+    parts = [cut_part(recording, *span) for recording in recordings for span in find_parts(recording)]
+    length = _choose_stretch_length([len(part) for part in parts], STRETCHES_PER_COMMAND * command_count)
+    pairs = [pair for part in parts for pair in _transform_stretches(part, length)] if length >= 16 else []
     if not pairs:
         return np.zeros((0, 0, command_count), complex), np.zeros((0, 0, response_count), complex)
     return np.array([u for u, _ in pairs]), np.array([y for _, y in pairs])
+
+
+def _choose_stretch_length(part_lengths: Sequence[int], stretch_count: int) -> int:
+    """Choose the largest length in samples of which the parts contain at least `stretch_count` stretches; 0 where there
+    is none."""
+    lengths = {part_length // count for part_length in part_lengths for count in range(1, stretch_count + 1)} - {0}
+    return max(
+        (length for length in lengths if sum(part_length // length for part_length in part_lengths) >= stretch_count),
+        default=0,
+    )
 
 
 def _transform_stretches(recording: Recording, length: int) -> Iterator[tuple[ComplexArray, ComplexArray]]:

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import MOST_PERIODS, find_parts
+from analysis.diagnosis.data.observed_parts import MOST_PERIODS
 from analysis.diagnosis.noise.rounding import find_rounding_step
 from analysis.wording import conjoin
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, find_parts
 from equalizer.signals.signal import FloatArray, Signal
 
 SHORTEST_PERIOD = 16

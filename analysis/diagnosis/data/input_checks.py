@@ -2,7 +2,6 @@
 refused and get no verdict, not even `unexplained`. Called by `study.workflows.diagnosis` and `prepare_recordings`."""
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 
 import numpy as np
 
@@ -121,19 +120,6 @@ def _describe_shortness(recordings: Sequence[Recording]) -> Iterator[str]:
             f"the recording holds about {cycles:.2g} cycles of the command, which is too short; at least "
             f"{LEAST_CYCLES:g} are needed, one part to fit and one to test"
         )
-
-
-def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
-    """Require recordings that differ: a duplicate would be tested by the data that it was fitted to. Raises
-    NothingToDiagnoseError."""
-    problems = [
-        f"{names[second]} holds the same samples as {names[first]}, and a recording counts once"
-        for first, second in combinations(range(len(recordings)), 2)
-        if np.array_equal(recordings[first].response.samples, recordings[second].response.samples, equal_nan=True)
-        and np.array_equal(recordings[first].command.samples, recordings[second].command.samples, equal_nan=True)
-    ]
-    if problems:
-        raise NothingToDiagnoseError(tuple(problems))
 
 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:

@@ -12,14 +12,12 @@ import numpy as np
 from analysis.diagnosis.data.observed import Observed, find_moving_spans, split_samples, stack_measured_signals
 from analysis.diagnosis.limits import CHOOSE_SHARE
 from analysis.diagnosis.types import Mask
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, find_parts
 from equalizer.signals.signal import Signal
 
 MOST_PERIODS = 4
 """Largest number of periods of a segment to fit and to choose by: further ones add computing time and little
 information. Chosen by hand."""
-LEAST_SAMPLES = 32
-"""Least number of samples of a part; shorter ones are left out. Chosen by hand."""
 
 
 def observe_parts(recordings: Sequence[Recording], response_count: int) -> tuple[Observed, ...]:
@@ -70,23 +68,6 @@ def _mask_surplus_periods(recording: Recording) -> Mask:
         if segment.period > 0:
             mask[segment.start + MOST_PERIODS * segment.period : segment.stop] = True
     return mask
-
-
-def find_parts(recording: Recording) -> tuple[tuple[int, int], ...]:
-    """Find begin and end (exclusive) of each part with at least `LEAST_SAMPLES`, as sample indices; the whole recording
-    where `meta` (key "parts") states no such part within it."""
-    stated_parts = recording.meta.get("parts")
-    stated_ranges = [
-        (int(stated_part["start"]), int(stated_part["stop"]))
-        for stated_part in (
-            stated_parts if isinstance(stated_parts, Sequence) and not isinstance(stated_parts, str) else ()
-        )
-        if isinstance(stated_part, dict) and "start" in stated_part and "stop" in stated_part
-    ]
-    ranges_within = [(start, stop) for start, stop in stated_ranges if start >= 0 and stop <= len(recording)]
-    return tuple(stated_part for stated_part in ranges_within if stated_part[1] - stated_part[0] >= LEAST_SAMPLES) or (
-        (0, len(recording)),
-    )
 
 
 def cut_part(recording: Recording, start: int, stop: int) -> Recording:

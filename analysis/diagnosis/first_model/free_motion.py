@@ -16,10 +16,9 @@ from analysis.diagnosis.balance.band import compute_band_end_hz
 from analysis.diagnosis.balance.motion import differentiate
 from analysis.diagnosis.data.measured_motion import FREE_MOTION, fill_gaps, is_driven, is_quasi_static
 from analysis.diagnosis.data.observed import find_moving_spans
-from analysis.diagnosis.data.observed_parts import find_parts
 from analysis.diagnosis.limits import DECAY_LEAST_CYCLES, DECAY_MOST_LEVELS
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, find_parts
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL, determine_unit_system
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion, find_motion_signals
-from analysis.diagnosis.data.observed_parts import find_parts
-from equalizer.signals.recording import Hold, Recording
+from equalizer.signals.recording import Hold, Recording, find_parts
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.unit_system import determine_unit_system
 

@@ -23,7 +23,7 @@ from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, compute_mean_spectrum, find_settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import select_instrument_signal
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, list_segments
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra, hann
 
@@ -93,7 +93,7 @@ def compute_residual_lines(recording: Recording, observation: Observation, used:
     settled_periods = {period.index: period for period in find_settled_periods(recording)}
     residual = observation.measured - observation.predicted
     octave_lines: list[ResidualLines] = []
-    for segment_index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
+    for segment_index, segment in enumerate(list_segments(recording)):
         if segment.kind == "rest":
             continue
         if segment_index in settled_periods:

@@ -17,7 +17,7 @@ from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, find_settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import select_instrument_signal
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, list_segments
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WINDOW_S = 2.0
@@ -99,7 +99,7 @@ def _cut_windows(recording: Recording, is_usable: Mask) -> list[Periods]:
     out."""
     length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
     windows = []
-    for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
+    for index, segment in enumerate(list_segments(recording)):
         for start in range(segment.start, segment.stop - length + 1, length):
             if segment.kind != "rest" and is_usable[start : start + length].all():
                 window = Segment(start, start + length, segment.kind, segment.amplitude, length, segment.role)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, list_segments
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra, hann
 
@@ -114,7 +114,7 @@ def collect_periodic_experiments(recordings: Sequence[Recording]) -> ExperimentS
 
 def collect_window_experiments(recordings: Sequence[Recording], window_s: float) -> ExperimentSet:
     """Collect Hann windows of window_s seconds (at least 8 samples, chosen), overlapping by half, over all driven
-    segments without the role "test" or, without segments, the whole recording. Windows with missing samples are left
+    segments without the role "test" or, without segments, over each part. Windows with missing samples are left
     out."""
     experiments: list[Experiment] = []
     for recording in recordings:
@@ -131,10 +131,8 @@ def collect_window_experiments(recordings: Sequence[Recording], window_s: float)
 
 
 def _select_driven_segments(recording: Recording) -> list[Segment]:
-    """Select the driven segments without the role "test"; the whole recording as one segment where none are stated."""
-    if not recording.segments:
-        return [Segment(0, len(recording), "noise")]
-    return [segment for segment in recording.segments if segment.kind in _DRIVEN_KINDS and segment.role != "test"]
+    """Select the driven segments (`list_segments`) without the role "test"."""
+    return [segment for segment in list_segments(recording) if segment.kind in _DRIVEN_KINDS and segment.role != "test"]
 
 
 def _has_all_samples(recording: Recording, start: int, length: int) -> bool:

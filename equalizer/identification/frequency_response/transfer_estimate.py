@@ -53,7 +53,7 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
     units, no segment for the fit yields a whole period or window without missing samples, an output is constant, or
     there are fewer independent experiments than inputs at every line."""
     settings = settings or EstimateSettings()
-    _check_compatible(recordings)
+    check_compatible(recordings)
     experiment_set = _collect_experiments(recordings, settings)
     if not experiment_set.experiments:
         raise TransferEstimateError(
@@ -170,7 +170,7 @@ def _join_groups(
     )
 
 
-def _check_compatible(recordings: Sequence[Recording]) -> None:
+def check_compatible(recordings: Sequence[Recording]) -> None:
     """Check the recordings: raises TransferEstimateError without any, for an inconsistent one, and where hold, sample
     rate, channels or units differ."""
     if not recordings:

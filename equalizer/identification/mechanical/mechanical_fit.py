@@ -47,7 +47,7 @@ from equalizer.identification.mechanical.modal_order import balance_fit, choose_
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.identification.mechanical.physical_model import make_physical_model
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.isolated_samples import interpolate_isolated_samples
+from equalizer.signals.isolated_samples import interpolate_all
 from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import find_unit_system
 
@@ -145,7 +145,7 @@ def fit_mechanical_model(
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
-    recordings, interpolation_remarks = zip(*map(interpolate_isolated_samples, recordings), strict=True)
+    recordings, interpolation_remarks = interpolate_all(recordings)
     fit_segments, test_segments = split_fit_and_test(recordings)
     fit_lines = [spectra for pair in fit_segments if (spectra := compute_segment_lines(*pair)) is not None]
     segments = select_band(fit_lines, settings.band_hz)
@@ -173,7 +173,7 @@ def fit_mechanical_model(
         reason=choice.reason,
         remarks=(
             *_list_remarks(final, recordings[0].response.channels, bool(test_lines)),
-            *filter(None, interpolation_remarks),
+            *interpolation_remarks,
         ),
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.identification.frequency_response.noise_floor import compute_period_variance, smooth_over_lines
-from equalizer.signals.recording import Hold, Recording, Segment
+from equalizer.signals.recording import Hold, Recording, Segment, list_segments
 from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra
 
@@ -212,10 +212,8 @@ def split_fit_and_test(
 
 
 def _iterate_driven_segments(recording: Recording) -> Iterator[Segment]:
-    """Iterate over the segments other than rest and free decay, or the whole recording where it has no segments."""
-    if not recording.segments:
-        yield Segment(0, len(recording), "noise")
-    for segment in recording.segments:
+    """Iterate over the segments (`list_segments`) other than rest and free decay."""
+    for segment in list_segments(recording):
         if segment.kind not in ("rest", "free"):
             yield segment
 

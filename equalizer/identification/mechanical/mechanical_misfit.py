@@ -166,25 +166,29 @@ def compute_misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list
     """Compute the weighted residuals of each group, (lines, p, rows), after transients were fitted to the lines not
     held out. Raises numpy.linalg.LinAlgError where the state matrix cannot be diagonalised."""
     form, misfits = compute_pole_form(model), []
+    spectra: dict[tuple[bytes, float, Hold, bool], tuple[ComplexArray, ComplexArray | None]] = {}
     for group in groups:
-        response = compute_sampled_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
+        grid = (group.frequency_hz.tobytes(), group.rate_hz, group.hold, group.transient)
+        if grid not in spectra:  # segments of one length share their lines
+            spectra[grid] = (
+                compute_sampled_response(model, group.frequency_hz, group.rate_hz, group.hold, form),
+                _compute_transient_spectra(group, model, form) if group.transient else None,
+            )
+        response, transient_spectra = spectra[grid]
         misfit = group.target - (group.root @ response[..., None])[..., 0]
-        misfits.append(
-            _subtract_transient(group, compute_transient_basis(group, model, form), misfit)
-            if group.transient
-            else misfit
-        )
+        misfits.append(misfit if transient_spectra is None else _subtract_transient(group, transient_spectra, misfit))
     return misfits
 
 
-def compute_transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
-    """Compute the weighted spectra of the free response to each state and, of accelerations, of the last command's
-    direct effect on each output, (lines, p, columns). form: pole-residue form of the model."""
+def _compute_transient_spectra(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
+    """Compute the spectra of the free response to each state and, of accelerations, of the last command's direct effect
+    on each output, (lines, p, columns). form: pole-residue form of the model."""
     free_response = compute_free_response(model, group.frequency_hz, group.rate_hz, form)
-    if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
-        feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free_response), model.outputs, model.outputs))
-        free_response = np.concatenate([free_response, feedthrough], axis=2)
-    return np.asarray(group.weight[:, :, None] * free_response)
+    if model.quantity != "acceleration":
+        return free_response
+    # The last command before the segment acts directly on the first response.
+    feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free_response), model.outputs, model.outputs))
+    return np.concatenate([free_response, feedthrough], axis=2)
 
 
 def stack_real(parts: Sequence[ComplexArray]) -> FloatArray:
@@ -258,9 +262,10 @@ def _merge_groups(group: LineGroup, added_group: LineGroup) -> LineGroup:
     )  # fmt: skip
 
 
-def _subtract_transient(group: LineGroup, basis: ComplexArray, misfit: ComplexArray) -> ComplexArray:
-    """Subtract the combination of basis columns, with real coefficients, that fits the lines not held out. Unchanged
-    where an entry of the basis exceeds `_LARGEST_TRANSIENT`."""
+def _subtract_transient(group: LineGroup, spectra: ComplexArray, misfit: ComplexArray) -> ComplexArray:
+    """Subtract the combination of weighted `spectra` (lines, p, columns), with real coefficients, that fits the lines
+    not held out. Unchanged where a weighted entry exceeds `_LARGEST_TRANSIENT`."""
+    basis = group.weight[:, :, None] * spectra
     if not np.abs(basis).max(initial=0.0) < _LARGEST_TRANSIENT:
         return misfit  # the search may try an unstable model, whose free response overflows
     is_fitted = ~group.held_out

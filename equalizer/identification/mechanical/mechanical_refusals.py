@@ -46,7 +46,8 @@ def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
     if len(quantities) > 1 or not quantities <= set(DERIVATIVE_OF_QUANTITY):
         raise MechanicalFitError(
             f"the responses are {', '.join(sorted(quantities))}, but a mechanical model answers one of "
-            f"{', '.join(DERIVATIVE_OF_QUANTITY)} for all channels"
+            f"{', '.join(DERIVATIVE_OF_QUANTITY)} for all channels; keep the responses of one quantity (the map of an "
+            "import can make the others helpers)"
         )
     inputs, outputs = len(first_recording.command.channels), len(first_recording.response.channels)
     if outputs < inputs:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from equalizer.identification.frequency_response.experiments import collect_periodic_experiments
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.local_polynomial import smooth_response
-from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
+from equalizer.identification.frequency_response.transfer_estimate import check_compatible, estimate_transfer
 from equalizer.identification.state_space.free_decay import extract_slow_modes, subtract_free_decay
 from equalizer.identification.state_space.identify import IdentificationResult, identify, write_outside_gain_remark
 from equalizer.identification.state_space.misfit import compute_estimate_misfit
@@ -19,6 +19,7 @@ from equalizer.identification.state_space.relaxed_poles import list_slow_poles
 from equalizer.identification.state_space.settings import ORDINARY_DECAY_S, IdentificationSettings
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.plant.model_response import compute_model_response
+from equalizer.signals.isolated_samples import interpolate_all
 from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summary, SummaryDisplay
 
@@ -57,7 +58,8 @@ def identify_recordings(
     smooth: bool | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> RecordingsIdentification:
-    """Identify a state-space model of the recorded device, and state how well it fits.
+    """Identify a state-space model of the recorded device, and state how well it fits. Isolated samples that no motion
+    can have are interpolated before, with a remark.
 
     smooth: whether to fit local averages over neighbouring lines, taken about the model where a pole decays more slowly
     than the ordinary bound, because they would blunt its resonance; None: where the lines scatter more than their
@@ -65,15 +67,18 @@ def identify_recordings(
     IdentificationError as `identify` does, and ValueError where there are too few lines for local averages.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    check_compatible(recordings)
+    recordings, interpolation_remarks = interpolate_all(recordings)
     settings = settings or IdentificationSettings()
     estimate = estimate_transfer(recordings)
     has_repeats = _has_repeats(recordings)
     if not has_repeats:
         settings = replace(settings, longest_decay_s=settings.decay_s)
     result = _fit_estimate(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
-    if has_repeats and result.fitted is result.estimate:
-        return result
-    return _add_misfit_causes(result, settings, has_repeats)
+    if not has_repeats or result.fitted is not result.estimate:
+        result = _add_misfit_causes(result, settings, has_repeats)
+    remarks = (*interpolation_remarks, *result.identified.remarks)
+    return replace(result, identified=replace(result.identified, remarks=remarks))
 
 
 def _fit_estimate(

@@ -28,6 +28,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModelError
+from equalizer.signals.isolated_samples import interpolate_isolated_samples
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
@@ -154,12 +155,22 @@ def _import_case(
         )
     except NothingToDiagnoseError as refusal:
         raise make_not_diagnosable_error(refusal.problems) from refusal
-    references = () if real_recording.reference is None else (import_real_recording(real_recording.reference),)
+    references, reference_remarks = _import_reference(real_recording.reference)
     kept_signals = keep_common_signals((*prepared.recordings, *references))
     recording = kept_signals.recordings[0]
     first_model = _choose_model(real_recording, recording, bounds, on_progress)
-    remarks = (*prepared.remarks, *kept_signals.remarks)
+    remarks = (*prepared.remarks, *reference_remarks, *kept_signals.remarks)
     return _ImportedCase(recording, first_model, remarks, kept_signals.recordings[1] if references else None)
+
+
+def _import_reference(found_map: FoundMap | None) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """Import the reference recording without isolated samples, as `prepare_recordings` does with the other: spikes in
+    one of both alone would look like a change of the device. Returns it and a remark on what was changed; both empty
+    for None."""
+    if found_map is None:
+        return (), ()
+    recording, change_text = interpolate_isolated_samples(import_real_recording(found_map))
+    return (recording,), ((f"{found_map.name}: {change_text}",) if change_text else ())
 
 
 def _allows_force_balance(real_recording: RealRecording) -> bool:

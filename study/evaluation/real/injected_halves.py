@@ -9,9 +9,9 @@ from analysis.diagnosis.contrast.bases import build_bases
 from analysis.diagnosis.contrast.compared_base import Base
 from analysis.diagnosis.contrast.joint_products import solve_residual_weights
 from analysis.diagnosis.contrast.recording_part import Part, split_into_parts
-from analysis.diagnosis.data.observed_parts import cut_part, find_parts
+from analysis.diagnosis.data.observed_parts import cut_part
 from equalizer.signals.joining import concatenate_if_all_present, concatenate_signals
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, find_parts
 from equalizer.signals.signal import FloatArray, Signal
 
 MAX_SAMPLES = 5_000

@@ -45,8 +45,8 @@ def read_clean_reference(
     clean_input = read_input(clean_paths, seed, constants=diagnosis_input.constants)
     try:
         require_comparable(
-            (diagnosis_input.recordings[0], *clean_input.recordings),
-            (diagnosis_input.names[0] if diagnosis_input.names else "the recording", *clean_input.names),
+            (*diagnosis_input.recordings, *clean_input.recordings),
+            (*diagnosis_input.names, *clean_input.names),
             "one says nothing of the other",
         )
     except NothingToDiagnoseError as refusal:

@@ -1,8 +1,8 @@
 """Identify a linear state-space model of a device from recordings, and write it to a file (`hapteq identify`).
 
-Steps: subtract the effects of a mechanical model, if one is given; estimate the frequency response and fit the model
-(`identify_recordings`); test it by free simulation of held-out segments (`validate_on_test`); write it with its
-quality, the position of the handle (place) and provenance.
+Steps: interpolate isolated samples (`interpolate_all`); subtract the effects of a mechanical model, if one is given;
+estimate the frequency response and fit the model (`identify_recordings`); test it by free simulation of held-out
+segments (`validate_on_test`); write it with its quality, the position of the handle (place) and provenance.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,6 +23,7 @@ from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.plant.model_quality import ModelQuality, summarise_quality
+from equalizer.signals.isolated_samples import interpolate_all
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.disk.provenance import gather_provenance
@@ -92,7 +93,9 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     StudyError if no model can be made from the recordings; nothing is written then."""
     settings = _make_settings(plan)
     require_new_output(plan.out)
-    recordings = tuple(read_recording(path) for path in plan.recordings)
+    recordings, interpolation_remarks = interpolate_all(
+        [read_recording(path) for path in plan.recordings], [path.name for path in plan.recordings]
+    )
     _require_same_system(recordings, plan.with_spring)
     if plan.with_spring:
         recordings = tuple(_use_excitation_as_input(recording) for recording in recordings)
@@ -101,9 +104,11 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         recordings = remove_effects(recordings, physics, plan.physics)
     try:
         identification = identify_recordings(recordings, settings, plan.smooth, on_progress)
-        model = _add_provenance(plan, recordings, identification.identified.model, physics)
+        remarks = (*interpolation_remarks, *identification.identified.remarks)
+        identified = replace(identification.identified, remarks=remarks)
+        model = _add_provenance(plan, recordings, identified.model, physics)
         held_out_test = validate_on_test(model, recordings)
-        model = replace(model, quality=_assess_quality(identification.identified, recordings, held_out_test))
+        model = replace(model, quality=_assess_quality(identified, recordings, held_out_test))
     except (TransferEstimateError, IdentificationError) as refusal:
         raise _make_error(str(refusal)) from refusal
     except np.linalg.LinAlgError as error:
@@ -116,15 +121,9 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     write_identified_model(plan.out, model)
     unremoved_effects = () if physics is None else explain_unremovable_effects(physics, recordings[0].command.channels)
     return IdentifiedDevice(
-        plan,
-        recordings,
-        identification.estimate,
-        identification.fitted,
-        identification.identified,
-        model,
-        held_out_test,
+        plan, recordings, identification.estimate, identification.fitted, identified, model, held_out_test,
         unremoved_effects,
-    )
+    )  # fmt: skip
 
 
 def _assess_quality(

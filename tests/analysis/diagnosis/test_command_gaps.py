@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import find_parts
 from analysis.diagnosis.prepare_recordings import bridge_gaps
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, find_parts
 from equalizer.signals.signal import Signal
 
 RATE_HZ = 500.0

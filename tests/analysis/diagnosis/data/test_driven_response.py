@@ -1,5 +1,7 @@
 """Whether responses have anything to do with commands: told from noise of any colour, and not judged where short."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -80,6 +82,40 @@ def test_a_slow_force_beside_friction_below_the_commands_noise_is_no_noise(seed)
     position = np.cumsum(speed)[:, None] / RATE_HZ
     sure = compute_response_significance([make_recording(current[:, None], position)])
     assert sure is None or sure >= DRIVEN_DEVIATIONS
+
+
+def join_in_parts(commands, responses) -> Recording:
+    """A recording of parts after one another, between which its signals jump."""
+    stops = np.cumsum([len(command) for command in commands]).tolist()
+    parts = [{"start": start, "stop": stop} for start, stop in zip([0, *stops], stops, strict=False)]
+    return replace(make_recording(np.vstack(commands), np.vstack(responses)), meta={"parts": parts})
+
+
+def step_under_control(gain: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Command and position of a mass of 0.1 kg with 1 N s/m at a target that steps to 1 m after a fifth of the time."""
+    position = speed = 0.0
+    rows = []
+    for sample in range(count):
+        force = gain * ((sample >= count // 5) - position)
+        rows.append((force, position))
+        speed += (force - speed) / 0.1 / RATE_HZ
+        position += speed / RATE_HZ
+    command, response = np.array(rows).T
+    return command[:, None], response[:, None]
+
+
+def test_single_steps_of_a_body_that_no_spring_returns_are_answers():
+    steps = [step_under_control(gain, count) for gain, count in ((1.0, 2000), (2.0, 1990), (4.0, 4500), (8.0, 1980))]
+    sure = compute_response_significance([join_in_parts(*zip(*steps, strict=True))])
+    assert sure is not None and sure > 2 * DRIVEN_DEVIATIONS
+
+
+@pytest.mark.parametrize("lengths", [(2000, 1990, 4500, 1980), (400,) * 30])
+def test_noise_in_parts_answers_nothing(lengths):
+    rng = np.random.default_rng(2)
+    commands, responses = ([rng.standard_normal((length, 1)) for length in lengths] for _ in range(2))
+    sure = compute_response_significance([join_in_parts(commands, responses)])
+    assert sure is not None and sure < DRIVEN_DEVIATIONS
 
 
 def test_every_labelled_case_answers_its_commands(shared):

@@ -8,7 +8,6 @@ import pytest
 from analysis.diagnosis.data.input_checks import (
     NothingToDiagnoseError,
     require_comparable,
-    require_different,
     require_model_of,
     require_usable_data,
 )
@@ -120,9 +119,9 @@ def test_where_only_the_test_holds_a_response_nothing_can_be_fitted():
 
 def test_a_recording_counts_once():
     one = make_recording()
-    said = refusal_text(require_different, [one, make_recording(seed=1), replace(one, device="copy")], ["a", "b", "c"])
-    assert said == "c holds the same samples as a, and a recording counts once"
-    require_different([one, make_recording(seed=1)], ["a", "b"])
+    said = refusal_text(require_comparable, [one, make_recording(seed=1), replace(one, device="copy")], ["a", "b", "c"])
+    assert said == "c holds the same samples as a, and a recording counts once: leave it out"
+    require_comparable([one, make_recording(seed=1)], ["a", "b"])
 
 
 def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_holds_many():

@@ -249,12 +249,12 @@ def test_what_cannot_be_fitted_is_refused_by_name():
             fit_mechanical_model([bad])
     with pytest.raises(MechanicalFitError, match="no recording"):
         fit_mechanical_model([])
-    other = replace(source, hold=Hold.LINEAR)
     with pytest.raises(MechanicalFitError, match="has the hold linear"):
-        fit_mechanical_model([source, other])
-    force = replace(source, response=replace(source.response, quantity="force", unit="N"))
-    with pytest.raises(MechanicalFitError, match="responses are force"):
-        fit_mechanical_model([force])
+        fit_mechanical_model([source, replace(source, hold=Hold.LINEAR)])
+    for quantity, unit in (("force", ("N",)), (("position", "angle"), ("m", "rad"))):
+        other = replace(source, response=Signal(np.tile(response, len(unit)), RATE_HZ, quantity, unit, tuple(unit)))
+        with pytest.raises(MechanicalFitError, match="keep the responses of one quantity"):
+            fit_mechanical_model([other])
 
 
 def test_a_part_with_missing_samples_is_left_out():

@@ -1,8 +1,11 @@
 """Spectra of segments: which of them contain a transient."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from equalizer.identification.frequency_response.experiments import collect_window_experiments
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings
 from equalizer.identification.mechanical.mechanical_lines import (
@@ -40,6 +43,17 @@ def test_where_all_segments_are_marked_as_test_the_marks_are_ignored():
         )
         fit, test = split_fit_and_test([recording(command, command, segments=segments)])
         assert (len(fit), len(test)) == count
+
+
+def test_without_segments_each_part_of_a_recording_is_one():
+    """Files that are joined: no spectrum reaches across the jumps between them."""
+    parts = [{"start": 0, "stop": 900}, {"start": 900, "stop": 920}, {"start": 920, "stop": 2000}]
+    command = np.random.default_rng(4).standard_normal((2000, 1))
+    joined = replace(recording(command, command), meta={"parts": parts})
+    expected = [Segment(0, 900, "noise"), Segment(920, 2000, "noise")]  # of the middle part, 20 samples are too short
+    assert [segment for _, segment in split_fit_and_test([joined])[0]] == expected
+    windows = collect_window_experiments([joined], 0.2).experiments  # of 100 samples, each 50 after the last
+    assert len(windows) == 17 + 20
 
 
 def test_as_many_lines_are_not_the_same_lines():

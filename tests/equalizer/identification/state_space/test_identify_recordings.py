@@ -60,3 +60,19 @@ def test_a_device_may_have_units_of_their_own_along_each_axis(plants, synthetic)
     assert found.identified.model.input_unit == ("N", "N", "N m")
     assert found.identified.model.output_unit == ("m/s^2", "m/s^2", "rad/s^2")
     assert len(repr(found).splitlines()) < 20
+
+
+def test_spikes_of_a_velocity_are_replaced_and_reported(plants, synthetic):
+    settings = IdentificationSettings(order=6, draws=0, longer_horizons=(0,), record_horizons=())
+    recording = synthetic.sweeps(plants, 4.5, 37.0, 3.0, periods=2)
+    velocity = replace(recording.response, quantity="velocity", unit="m/s", channels=("vx", "vy", "vz"))
+    spiked = velocity.samples.copy()
+    spiked[2000::1500, 0] += 20 * velocity.samples[:, 0].std()
+    clean, found = (
+        identify_recordings(replace(recording, response=replace(velocity, samples=samples)), settings, smooth=False)
+        for samples in (velocity.samples, spiked)
+    )
+    (remark,) = set(found.identified.remarks) - set(clean.identified.remarks)
+    assert f"replaced by interpolated values: {len(spiked[2000::1500])} of vx" in remark
+    responses = [compute_model_response(each.identified.model, LINES) for each in (clean, found)]
+    assert np.linalg.norm(responses[1] - responses[0]) < 1e-3 * np.linalg.norm(responses[0])

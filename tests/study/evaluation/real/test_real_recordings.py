@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.search.guard import Guard
 from study.errors import StudyError, UserInterruptError
+from study.evaluation.real import diagnose_real
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder, diagnose_sent_recording
 from study.evaluation.real.real_summary import format_real_lines
@@ -72,6 +75,36 @@ def test_recordings_that_are_links_are_sent_to_workers_too(folder: Path, tmp_pat
     (sent,) = read_real_folder(there).recordings
     assert (sent.name, [path.name for path in sent.found_map.files]) == ("run", ["run.npz"])
     assert sent.read_model() is not None
+
+
+def test_spikes_of_the_reference_are_replaced_like_those_of_the_recording(tmp_path: Path, monkeypatch) -> None:
+    folder = tmp_path / "recordings" / "axis"
+    folder.mkdir(parents=True)
+    for name in ("before", "after"):
+        signals = played(0.0)
+        velocity = np.cumsum(signals["y"]) / RATE_HZ
+        spiked = velocity.copy()
+        spiked[500:3500:500] += 20 * velocity.std()
+        np.savez(folder / f"{name}.npz", u=signals["u"], y=spiked)
+    pair = '[[diagnosis.pair]]\nbefore = "before.npz"\nafter = "after.npz"\nchanged = "a body was added"\n'
+    map_text = MAP.replace('files = ["run.npz"]', 'separate = true\nfiles = ["*.npz"]').replace("m/s^2", "m/s")
+    (folder / "run.toml").write_text(map_text + pair)
+    (folder / "axis.model.toml").write_text(MODEL.replace("acceleration", "velocity"))
+    compared: list[DiagnosisSettings] = []
+
+    def keep_settings(recordings, model, settings, *_: object) -> None:
+        compared.append(settings)
+        raise StudyError("kept", "kept", "kept")
+
+    monkeypatch.setattr(diagnose_real, "diagnose", keep_settings)
+    after = next(each for each in read_real_folder(folder.parent).recordings if each.reference is not None)
+    bounds = (lambda: True), Guard(enabled=False)
+    assert diagnose_real.diagnose_real(after, *bounds, silent).answer.verdict == "refused"
+    assert np.abs(compared[0].clean[0].response.samples[:, 0] - velocity).max() < velocity.std()
+    case = diagnose_real._import_case(after, bounds, silent)
+    told = [remark for remark in case.remarks if "replaced by interpolated values: 6 of ax" in remark]
+    assert [remark.split(":")[0] for remark in told] == ["Isolated samples that no motion can have, such as spikes of a"
+        " sensor or lost samples, were replaced by interpolated values", "run_before"]  # fmt: skip
 
 
 def test_a_recording_that_did_not_come_to_its_worker_is_named() -> None:

@@ -14,6 +14,7 @@ from study.store.formats.recording_file import write_recording
 from study.workflows.equalizer.identified_summary import format_summary, summarise_model
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.equalizer.report_identification import report_identification
+from study.workflows.recording.import_recording import ImportPlan, import_recording
 from tests.slow_instances import slow
 
 RATE_HZ = 1000.0
@@ -70,6 +71,16 @@ def test_the_model_on_disk_is_the_device(device, plants):
     f = np.linspace(5.0, 35.0, 61)
     truth = plants.omega_like().response(f)
     assert np.linalg.norm(compute_model_response(model, f) - truth) < 0.01 * np.linalg.norm(truth)
+
+
+def test_a_recording_that_is_given_twice_is_refused(folder, tmp_path):
+    path = folder / "sweep.h5"
+    (tmp_path / "link.h5").symlink_to(path)
+    import_recording(ImportPlan((path,), None, tmp_path / "copy.h5"))
+    for other in (path, tmp_path / "link.h5", tmp_path / "copy.h5"):
+        with pytest.raises(StudyError, match="ecording 2 holds the same samples as recording 1"):
+            identify_model(IdentifyPlan((path, other), tmp_path / "model.h5", order=20), lambda share: None)
+    assert not (tmp_path / "model.h5").exists()
 
 
 def test_results_hold_the_hashes_of_their_input_files(device):
@@ -148,8 +159,9 @@ def test_one_axis_is_too_little(plants, tmp_path):
 
 @pytest.mark.slow
 def test_recordings_of_two_places_are_no_model_of_one(folder, plants, tmp_path):
-    other = replace(swept(plants), meta={"place_m": [0.05, 0.0, 0.0]})
-    write_recording(tmp_path / "edge.h5", other)
+    other = swept(plants)
+    weaker = replace(other.response, samples=0.9 * other.response.samples)
+    write_recording(tmp_path / "edge.h5", replace(other, response=weaker, meta={"place_m": [0.05, 0.0, 0.0]}))
     said = refused(IdentifyPlan((folder / "sweep.h5", tmp_path / "edge.h5"), tmp_path / "m.h5", order=14))
     assert "different places; identify one model per place" in said.happened
 

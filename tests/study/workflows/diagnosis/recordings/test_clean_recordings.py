@@ -39,6 +39,17 @@ def test_a_recording_cannot_be_diagnosed_and_be_clean(files, findings, tmp_path)
         diagnose_recordings(plan(files, tmp_path / "out", clean=(files / "rec.h5",)), quiet, Scripted(findings))
 
 
+def test_a_copy_of_a_diagnosed_recording_cannot_be_clean(files, findings, tmp_path, made):
+    other = made.recorded(1, seed=8)
+    write_recording(tmp_path / "other.h5", other)
+    write_recording(tmp_path / "copy.h5", replace(other, device="copy"))
+    sources = (files / "rec.h5", tmp_path / "other.h5")
+    with pytest.raises(StudyError, match=r"copy\.h5 holds the same samples as other\.h5"):
+        diagnose_recordings(
+            plan(files, tmp_path / "out", sources=sources, clean=(tmp_path / "copy.h5",)), quiet, Scripted(findings)
+        )
+
+
 def test_clean_recordings_of_another_device_are_refused(files, findings, tmp_path, made):
     write_recording(tmp_path / "clean.h5", made.recorded(2, ()))
     with pytest.raises(StudyError, match=r"clean.h5 has the command .*one says nothing of the other") as refused:

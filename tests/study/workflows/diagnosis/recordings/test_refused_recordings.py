@@ -1,6 +1,7 @@
 """Recordings and models that do not go together are refused by name, or what is left out of them is said."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -98,6 +99,12 @@ def test_a_recording_that_is_given_twice_is_refused(files, findings, tmp_path, r
             diagnose_recordings(
                 plan(files, tmp_path / "out", sources=(files / "rec.h5", other)), quiet, Scripted(findings)
             )
+
+
+def test_a_file_in_the_current_folder_is_named_without_a_folder(files, findings, tmp_path, monkeypatch):
+    monkeypatch.chdir(files)
+    error = refused_with(files, findings, tmp_path, sources=(Path("rec.h5"), Path("rec.h5")))
+    assert "ec.h5 (2) holds the same samples as rec.h5 (1)" in error.happened and "/rec.h5" not in error.happened
 
 
 def test_recordings_of_one_name_are_distinguished_by_their_folders(files, findings, tmp_path, made):
