@@ -37,7 +37,7 @@ def withdraw(
     typer.echo(f"To be erased for good, in {data_folder}: {', '.join(plan.sessions)}{analysis_note}", err=True)
     for sentence in plan.doubtful:
         typer.echo(f"Not to be erased: {sentence}", err=True)
-    if not yes and not typer.confirm("Erase them?", err=True):
+    if not yes and not _ask_whether_to_erase():
         typer.echo("Nothing was erased.", err=True)
         return
     erased = erase(data_folder, plan, RealClock().utc())
@@ -47,3 +47,18 @@ def withdraw(
     found_later = (f"Not erased: {sentence}" for sentence in erased.doubtful if sentence not in plan.doubtful)
     for sentence in (*found_later, *list_remaining_copies(data_folder, erased)):
         typer.echo(sentence, err=True)
+
+
+def _ask_whether_to_erase() -> bool:
+    """Ask for the confirmation. Raises UserInterruptError at Ctrl-C and at the end of the input."""
+    from study.errors import UserInterruptError
+
+    try:
+        return typer.confirm("Erase them?", err=True)
+    except typer.Abort as interruption:
+        raise UserInterruptError(
+            "Not confirmed",
+            "The question was not answered.",
+            "Run the command again, or with --yes, which does not ask.",
+            saved="Nothing was erased.",
+        ) from interruption

@@ -43,7 +43,10 @@ def describe_progress(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
 
 
 def describe_plan(welcome: Welcome, words: Words = ENGLISH_WORDS) -> str:
-    """Describe the sitting: its number of runs, and whether training is among them; without runs, training only."""
+    """Describe the sitting: its number of runs, and whether training is among them; without runs, training only. After
+    earlier sittings: the number of runs that are left, training included."""
+    if welcome.resumed_after:
+        return words.fill_count("runs_left", welcome.runs + welcome.training_runs)
     if not welcome.runs:
         return words["plan_training"]
     return words.fill_count("plan_training_runs" if welcome.training_runs else "plan_runs", welcome.runs)

@@ -6,6 +6,8 @@ after `open_model`, closing is the caller's task. Called by `open_rig` (sessions
 """
 
 import os
+import threading
+from concurrent.futures import Future
 
 from study.devices.force_dimension.device_models import DeviceModel, find_model_key
 from study.devices.force_dimension.handle import Handle
@@ -27,6 +29,9 @@ MAX_DEVICES = 16
 """Largest number of devices that are opened in the search for a model: limits the search where the library returns a
 wrong count. Chosen. Where the library counts more, the error for a device that was not found states both numbers."""
 
+OPENING_TIMEOUT_S = 20.0
+"""Longest time (s) that the library may take to open a device: several times as long as any takes. Chosen."""
+
 CALIBRATION_ADVICE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
     "calibration program), then try again."
@@ -45,13 +50,13 @@ def load_library() -> Library:
 
 def open_model(library: Library, model: DeviceModel) -> Handle:
     """Open the first free device of this model; its watchdog is not armed and its forces are not enabled yet. Devices
-    of other models are closed again. Raises `DeviceError` where there is none."""
+    of other models are closed again. Raises `DeviceError` where there is none, or one hangs while it is opened."""
     other_devices: list[tuple[str, str | None]] = []
     failures: list[LibraryError] = []
     device_count = max(0, int(library.get_function("dhdGetDeviceCount")()))
     for device_index in range(min(MAX_DEVICES, device_count)):
         try:
-            handle = Handle(library, library.call("dhdOpenID", device_index))
+            handle = _open_in_time(library, device_index, model)
         except LibraryError as error:
             failures.append(error)
             continue
@@ -71,6 +76,37 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
         raise missing_error
     count_text = f"The library counts {device_count} devices, of which the first {MAX_DEVICES} were looked at."
     raise DeviceError(missing_error.title, f"{missing_error.happened} {count_text}", missing_error.do_now)
+
+
+def _open_in_time(library: Library, device_index: int, model: DeviceModel) -> Handle:
+    """Open a device in a thread of its own, so that a USB transfer that hangs blocks neither this thread nor its
+    interruption; a device that opens too late is closed again. Raises `LibraryError`, and `DeviceError` after
+    `OPENING_TIMEOUT_S`."""
+    opened: Future[int] = Future()
+
+    def open_device() -> None:
+        try:
+            number = library.call("dhdOpenID", device_index)
+        except LibraryError as error:
+            if opened.set_running_or_notify_cancel():
+                opened.set_exception(error)
+        else:
+            if opened.set_running_or_notify_cancel():
+                opened.set_result(number)
+            else:
+                Handle(library, number).disconnect()
+
+    threading.Thread(target=open_device, name="dhdOpenID", daemon=True).start()
+    try:
+        return Handle(library, opened.result(OPENING_TIMEOUT_S))
+    except TimeoutError as error:
+        raise DeviceError(
+            f"The {model.name} does not answer",
+            f"The vendor's library did not open it within {OPENING_TIMEOUT_S:g} s: its USB connection hangs.",
+            "Unplug its USB cable, switch it off and on, plug it in again, then try again.",
+        ) from error
+    finally:
+        opened.cancel()
 
 
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, types
 
+from analysis.psychophysics.ellipsoid import read_sensor_frame
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 from study.devices.device import REPLAY_PREFIX, DeviceInfo
@@ -145,8 +146,9 @@ def _find_stretch(excitation: FloatArray, pattern: FloatArray) -> int:
 def _collect_readings(recording: Recording, path: Path) -> FloatArray:
     """Collect the recorded readings (n, READING_SIZE). Missing positions, such as of missed ticks, are interpolated
     linearly, because the safety layer ends a stimulus at a reading without a position. Clipping of the sensor is not
-    recorded, and is 0. Raises `DeviceError` for a recording without a position in m or an acceleration in m/s², three
-    channels each."""
+    recorded, and is 0. Accelerations are turned into the device's axes where the recording states the sensor's frame.
+    Raises `DeviceError` for a recording without a position in m or an acceleration in m/s², three channels each, and
+    for a frame that is no rotation."""
     position, response = recording.position, recording.response
     if (
         position is None
@@ -163,8 +165,19 @@ def _collect_readings(recording: Recording, path: Path) -> FloatArray:
     for channel, samples in enumerate(_arrange_axes(position, "").T, start=POSITION.start):
         (known_rows,) = np.nonzero(~np.isnan(samples))
         readings[:, channel] = np.interp(np.arange(len(samples)), known_rows, samples[known_rows])
-    readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = _arrange_axes(response, "a")
+    readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = _turn_to_device(recording, path)
     return readings
+
+
+def _turn_to_device(recording: Recording, path: Path) -> FloatArray:
+    """Turn the accelerations (n, 3), m/s², from the sensor's axes to the device's. Raises `DeviceError` for a frame
+    that is no rotation."""
+    try:
+        rotation = read_sensor_frame(recording)
+    except ValueError as error:
+        raise _make_replay_error(f"{path.name}: {error}.") from error
+    accelerations = _arrange_axes(recording.response, "a")
+    return accelerations if rotation is None else np.asarray(accelerations @ rotation.T)
 
 
 def _estimate_noise_mps2(acceleration: FloatArray) -> float:

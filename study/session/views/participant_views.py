@@ -43,9 +43,9 @@ class Welcome:
     title: str
     picture: DirectionPicture
     runs: int
-    """Number of runs in the session, without training and practice."""
+    """Number of runs that are left in the session, without training and practice."""
     training_runs: int
-    """Number of runs of training, practice included."""
+    """Number of runs of training that are left, practice included."""
     device: str
     device_moves: bool
     """Whether a real device moves, so that the answers are not only practice; true for a simulated participant."""

@@ -15,6 +15,9 @@ from pathlib import Path
 from study.errors import StudyError
 from study.regular_file import RefusedFileError
 
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""Signature of HDF5: the first bytes of a file without a user block."""
+
 VALIDATE_ADVICE = "Correct it, or make it again; `hapteq validate` checks it."
 """Remedy for a file whose content is invalid."""
 
@@ -146,6 +149,8 @@ def _explain_read_failure(path: Path, error: OSError | UnicodeDecodeError) -> st
         case PermissionError():
             return f"You have no right to read {path}"
         case UnicodeDecodeError():
+            if error.object.startswith(HDF5_SIGNATURE, error.start):  # a user block before it is text
+                return "It is an HDF5 file, and text is expected here"
             return f"It is neither HDF5 nor text in UTF-8 (byte {error.start})"
         case RefusedFileError():
             return error.reason[:1].upper() + error.reason[1:]

@@ -19,7 +19,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.regular_file import open_regular
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.file_errors import DAMAGE_ERRORS, CannotReadError, UnusableFileError
+from study.store.disk.file_errors import DAMAGE_ERRORS, HDF5_SIGNATURE, CannotReadError, UnusableFileError
 from study.store.disk.hdf5_attributes import AttributeProblemError, read_numbers_attribute, read_text_attribute
 from study.store.disk.hdf5_contents import check_contents
 
@@ -30,8 +30,6 @@ SEAL_PREFIX = b"hapteq sha256 "
 """First bytes of a sealed file. The hexadecimal SHA-256 digest and the size in bytes follow, as ASCII text."""
 USER_BLOCK_BYTES = 512
 """Length of the user block of a sealed file (bytes): the smallest that HDF5 allows."""
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""Signature of HDF5: the first bytes of a file without a user block."""
 BROKEN_SEAL_PROBLEM = (
     "its content does not fit the check sum at its beginning: it was damaged, cut off, or changed by another program "
     "since it was written"

@@ -64,7 +64,7 @@ HELP = """\
 
 **New session** (F2). Type the participant's code, choose protocol and device, and press F5. A code has 1 to 16 letters
 and digits, with at least one digit, such as P01. Names stay off this computer. A protocol whose stimuli are
-accelerations also needs a model of the device, in the data folder (`hapteq identify` makes it).
+accelerations also needs a model of the device, in the data folder or next to it (`hapteq identify` makes it).
 
 **Sessions** (F3), latest first. The arrow keys move, and:
 

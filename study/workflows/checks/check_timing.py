@@ -163,5 +163,6 @@ def _judge_loop(duration_s: float, health: Health) -> DeviceFinding:
     """Judge whether the loop held the zero force to the end, without a fault of the device."""
     if health.fault is not Fault.NONE:
         advice = "Check the device's power and cable and what else runs on this computer, then measure again."
-        return DeviceFinding("Loop", f"it let go: {health.fault.value}", fine=False, advice=advice)
+        cause = f": {health.why}" if health.why else ""
+        return DeviceFinding("Loop", f"it let go: {health.fault.value}{cause}", fine=False, advice=advice)
     return DeviceFinding("Loop", f"{health.ticks} ticks in {duration_s:g} s, zero force held to the end", fine=True)

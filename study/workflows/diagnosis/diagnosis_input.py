@@ -141,4 +141,5 @@ def _name_sources(sources: Sequence[Path]) -> tuple[str, ...]:
     names = tuple(source.name for source in sources)
     if len(set(names)) == len(names):
         return names
-    return tuple(f"{source.parent.name}/{source.name} ({number})" for number, source in enumerate(sources, start=1))
+    paths = (Path(source.parent.name, source.name).as_posix() for source in sources)
+    return tuple(f"{path} ({number})" for number, path in enumerate(paths, start=1))

@@ -31,7 +31,8 @@ from equalizer.laws.law import Law
 
 ENTRY = LawEntry(
     name={name!r},
-    # p0, p1, ... are free; a fit starts from `numbers`, and force factors from a linear regression.
+    # p0, p1, ... are free; a fit starts from `numbers` (a single one: (3.0,)), and force factors from a linear
+    # regression.
     law=Law(
         expression={expression!r},
         numbers={numbers!r},
@@ -115,7 +116,8 @@ def read_entry(path: Path) -> LawEntry:
     catalogue_names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
     if not isinstance(entry, LawEntry) or entry.name in catalogue_names or not _has_valid_fields(entry):
         raise _make_effect_error(
-            f"{path} defines no ENTRY with a valid name that is not in the catalogue and a Law of finite numbers.",
+            f"{path} defines no ENTRY of texts, with a valid name that is not in the catalogue, and a Law of finite "
+            "numbers, with texts as axis and units.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",
         )
     return entry
@@ -124,9 +126,11 @@ def read_entry(path: Path) -> LawEntry:
 def _has_valid_fields(entry: LawEntry) -> bool:
     """Whether the fields of an entry, which a user may have changed, are of their types, its name is valid, and the
     numbers of its law are finite."""
-    texts: tuple[object, ...] = (entry.name, entry.source, entry.signature)
     law: object = entry.law
-    if not all(isinstance(text, str) for text in texts) or not isinstance(law, Law):
+    if not isinstance(law, Law):
+        return False
+    texts: tuple[object, ...] = (entry.name, entry.source, entry.signature, law.axis, *(law.units or ()))
+    if not all(isinstance(text, str) for text in texts):
         return False
     numbers: tuple[object, ...] = law.numbers
     are_finite = (isinstance(number, int | float) and math.isfinite(number) for number in numbers)

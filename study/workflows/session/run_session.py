@@ -246,11 +246,12 @@ def _is_feedback_due(state: SessionState, due_trial: PresentTrial) -> bool:
 
 def _make_welcome(state: SessionState, sitting: Sitting) -> Welcome:
     """Make the content of the instructions at the beginning of a sitting."""
-    training_run_count = sum(run.phase is Phase.TRAINING for run in state.runs)
+    runs_left = state.runs[state.run :]
+    training_run_count = sum(run.phase is Phase.TRAINING for run in runs_left)
     return Welcome(
         title=state.protocol.title,
         picture=make_direction_picture(state.protocol.directions, has_swapped_labels(state.protocol, state.opened)),
-        runs=len(state.runs) - training_run_count,
+        runs=len(runs_left) - training_run_count,
         training_runs=training_run_count,
         device=sitting.device.info.name,
         device_moves=is_felt_by_person(state.opened) is not False,

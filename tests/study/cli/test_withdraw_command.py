@@ -1,6 +1,7 @@
 """Withdrawing from the command line: what is erased, and what is not."""
 
 import errno
+import io
 import json
 import os
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from study.cli.main import main
+from study.errors import ExitCode
 from study.store.disk.file_errors import CannotWriteError
 
 pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
@@ -47,6 +49,14 @@ def test_a_withdrawal_that_is_not_confirmed_erases_nothing(run, data, monkeypatc
     code, _, err = run("withdraw", "P01_001", "--data", data)
     assert code == 0
     assert "Nothing was erased." in err
+    assert (data / "P01_001" / "events.jsonl").exists()
+
+
+def test_a_question_without_an_answer_erases_nothing_and_says_so(run, data, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("P01\n"))
+    code, _, err = run("withdraw", "P01_001", "--data", data)
+    assert code == ExitCode.INTERRUPTED
+    assert "Nothing was erased." in err and "--yes" in err
     assert (data / "P01_001" / "events.jsonl").exists()
 
 

@@ -47,6 +47,10 @@ def test_what_cannot_be_read_is_named(tmp_path):
         CannotReadError, match=r"a\.txt cannot be read. It is neither HDF5 nor text in UTF-8 \(byte 2\)"
     ):
         read_text(tmp_path / "a.txt")
+    for user_block in (b"", b"seal".ljust(512, b"\0")):
+        (tmp_path / "a.h5").write_bytes(user_block + b"\x89HDF\r\n\x1a\n")
+        with pytest.raises(CannotReadError, match=r"It is an HDF5 file, and text is expected here"):
+            read_text(tmp_path / "a.h5")
     with pytest.raises(CannotReadError, match=r"There is no file .*none. Check the name and the folder"):
         read_text(tmp_path / "none")
     with pytest.raises(CannotReadError, match=r".* is a folder"):

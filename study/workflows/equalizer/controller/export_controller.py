@@ -163,10 +163,13 @@ def _read_transient(path: Path, model: IdentifiedModel) -> FloatArray:
     than the model's, or too many rows."""
     table = read_trajectory(path)
     if table.kind is not TRAJECTORY:
-        raise TableError((f"{path.name} holds forces; a transient is a table of accelerations",))
+        header = ",".join(TRAJECTORY.header)
+        raise TableError((f"the table {path.name} holds {table.kind.name}; its header must be {header}",))
     require_rate(table, model.sample_rate_hz)
     if len(table.signal) > MAX_TRANSIENT_ROWS:
-        raise TableError((f"{path.name} has {len(table.signal)} rows; a controller takes {MAX_TRANSIENT_ROWS}",))
+        raise TableError(
+            (f"the table {path.name} has {len(table.signal)} rows; a controller takes {MAX_TRANSIENT_ROWS}",)
+        )
     return table.signal.samples
 
 

@@ -127,6 +127,19 @@ def test_a_failed_opening_names_the_cause_and_leaves_the_brakes_on(stub, opened,
     assert (stub.get("opened"), stub.get("peak_n")) == (0, 0)
 
 
+def test_a_device_that_hangs_while_it_is_opened_is_reported_and_closed_when_it_opens_late(stub, opened, monkeypatch):
+    monkeypatch.setattr(connect, "OPENING_TIMEOUT_S", 0.2, raising=False)
+    stub.delay("dhdOpenID", 3.0, times=1)
+    said = refused(opened)
+    assert stub.get("closes") == 0
+    assert "does not answer" in said and "within 0.2 s" in said and "Unplug its USB cable" in said
+    until_s = time.monotonic() + 10.0
+    while stub.get("closes") == 0:
+        assert time.monotonic() < until_s
+        time.sleep(0.05)
+    assert stub.safe and stub.get("opened") == 0
+
+
 def test_without_a_watchdog_it_opens_where_no_hand_is_on_the_handle(stub, opened):
     stub.set("watchdog_settable", 0)
     with opened(hand=False) as device:

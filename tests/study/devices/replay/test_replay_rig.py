@@ -50,6 +50,19 @@ def test_commands_that_were_recorded_are_answered_as_they_were_in_any_order(rigs
         np.testing.assert_allclose(found.excitation.samples, right.excitation.samples, atol=1e-12)
 
 
+def test_accelerations_of_a_turned_sensor_are_replayed_in_the_axes_of_the_device(rigs, commands, originals, tmp_path):
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    (original, *_), frame = originals, {"sensor": {"frame_to_device": turn.tolist()}}
+    measured = replace(original.response, samples=original.response.samples @ turn)
+    write_recording(tmp_path / "turned.h5", replace(original, response=measured, meta=frame))
+    (found,) = played_on(f"replay:{tmp_path / 'turned.h5'}", rigs, commands[:1])
+    np.testing.assert_array_equal(found.response.samples, original.response.samples)
+    mirrored = {"sensor": {"frame_to_device": np.diag([1.0, 1.0, -1.0]).tolist()}}
+    write_recording(tmp_path / "mirrored.h5", replace(original, meta=mirrored))
+    with pytest.raises(DeviceError, match=r"mirrored\.h5: the sensor's frame is a reflection"):
+        played_on(f"replay:{tmp_path / 'mirrored.h5'}", rigs, commands[:1])
+
+
 def test_a_part_of_what_was_recorded_is_found_in_its_middle(rigs, commands, originals, file):
     (found,) = played_on(f"replay:{file}", rigs, [0.5 * (commands[1] + np.roll(commands[1], 1, axis=0))])
     assert len(found) == 1000

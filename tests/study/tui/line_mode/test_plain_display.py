@@ -110,6 +110,7 @@ def test_practice_on_a_simulation_is_called_practice(typed):
     assert "Practice: the device is a simulation (simulated omega.3), so nothing moves here." in text
     assert "never enter an analysis of people" in text
     assert "Welcome back: 12 answers are on the disk" in text
+    assert "5 runs are left." in text
 
 
 def test_after_a_void_trial_nothing_is_played_before_a_key_press(typed):

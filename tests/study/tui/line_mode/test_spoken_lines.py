@@ -92,8 +92,9 @@ def told(spoken):
 
 def test_the_trial_part_is_in_the_language(told):
     display = told.display
-    told.type("")
-    display.welcome(Welcome("Titel", PICTURE, 5, 1, "simulated omega.3", False, 12))
+    for answers in (0, 12):
+        told.type("")
+        display.welcome(Welcome("Titel", PICTURE, 5, 1, "simulated omega.3", False, answers))
     told.type("x", "2", "?", "n", "n", "n", "b", "b", "b", "")
     menu = DemoMenu(PICTURE, 2, 1, ((1, 1),), handle_moves=False)
     display.choose_demo(menu, lambda: True)
@@ -112,7 +113,8 @@ def test_the_trial_part_is_in_the_language(told):
     display.feedback(False)
     assert "simulated" not in told.out.getvalue()
     told.check("line_hold", "line_how", "line_keys", "not_felt", "welcome_back_n", "plan_training_runs_n",
-               "line_intervals", "fact_direction", "fact_bring_back", "no_repeats", "right", "wrong")  # fmt: skip
+               "runs_left_n", "line_intervals", "fact_direction", "fact_bring_back", "no_repeats", "right",
+               "wrong")  # fmt: skip
 
 
 def test_the_rest_of_it_too(told):

@@ -107,7 +107,7 @@ def test_a_device_that_is_lost_in_the_middle_is_reported(rigs, settings):
     timing, found = timed(SafeDevice(rig, settings, clock), clock)
     assert timing.health.fault is Fault.LOST
     assert clock.now_s() < 0.7
-    assert (found["Loop"].value, found["Loop"].fine) == ("it let go: the device stopped answering", False)
+    assert (found["Loop"].value, found["Loop"].fine) == ("it let go: the device stopped answering: usb", False)
     assert found["Loop"].advice.startswith("Check the device's power and cable")
 
 

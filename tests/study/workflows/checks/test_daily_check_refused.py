@@ -141,6 +141,25 @@ def test_a_baseline_that_tells_too_little_is_refused(device_like, monkeypatch):
                 daily_check._record_baseline_on(device, plan, QUIET)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"sample_rate_hz": 2000.0}, "the sample rate is 2000 Hz now, but was 1000 Hz at the acceptance"),
+        ({"unit": "m/s", "quantity": "velocity"}, r"the response is ax \(m/s\), .* now, but was ax \(m/s\^2\), "),
+        ({"channels": ("ax", "az", "ay")}, r"the response is .* now, but was .* at the acceptance"),
+    ],
+)
+def test_what_was_measured_otherwise_is_not_compared(two_days, change, said):
+    """At twice the rate, periods of the same length in samples have other frequencies."""
+    baseline = read_recording(two_days[0])
+    signals = {"response": replace(baseline.response, **change)}
+    if "sample_rate_hz" in change:
+        names = ("command", "response", "position", "excitation")
+        signals = {name: replace(getattr(baseline, name), **change) for name in names}
+    with pytest.raises(DeviceError, match=said):
+        compare_recordings(baseline, replace(baseline, **signals))
+
+
 def test_what_was_played_otherwise_is_not_compared(two_days, device_like, recorded):
     baseline = read_recording(two_days[0])
     first, *others = baseline.segments

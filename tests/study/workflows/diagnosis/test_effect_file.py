@@ -80,6 +80,8 @@ def test_a_file_that_is_no_effect_is_refused(tmp_path, text, said):
     [
         ("name='mine'", "name=5", "defines no ENTRY"),
         ("source='found", "source=5 or 'found", "defines no ENTRY"),
+        ("axis='x'", "axis=1", "defines no ENTRY"),
+        ("units=()", "units=(1, 2)", "defines no ENTRY"),
         ("numbers=(60.0, 1.5)", "numbers=('a', 1.5)", "defines no ENTRY"),
         ("numbers=(60.0, 1.5)", "numbers=(float('nan'), 1.5)", "defines no ENTRY"),
         ("ENTRY = LawEntry(", "raise SystemExit\nENTRY = LawEntry(", "fails: SystemExit"),

@@ -199,7 +199,8 @@ def test_numbers_are_written_to_their_last_bit(exported):
     [
         ("there already", "exists already"),
         ("two axes", "not of three forces"),
-        ("forces", "holds forces"),
+        ("forces", "The table table.csv holds forces; its header must be time_s,ax,ay,az."),
+        ("one axis", "The table table.csv holds transient; its header must be time_s,ax,ay,az."),
         ("rate", "at 500 Hz"),
         ("long", "5001 rows"),
         ("preview", "2 s is the longest"),
@@ -215,6 +216,11 @@ def test_what_cannot_be_exported_is_reported_and_nothing_is_written(tmp_path, ca
     out, words = tmp_path / "out", []
     if change == "there already":
         out.mkdir()
+    if change == "one axis":  # a table of `hapteq contact`
+        write_trajectory(
+            tmp_path / "table.csv", Trajectory(Signal(np.ones((20, 1)), 1000.0, "acceleration", "m/s^2", ("a",)))
+        )
+        words = ["--transient", str(tmp_path / "table.csv")]
     if change in ("forces", "rate", "long", "silent"):
         kind = ("force", "N", CHANNELS[0]) if change == "forces" else ("acceleration", "m/s^2", CHANNELS[1])
         rate_hz = 500.0 if change == "rate" else 1000.0

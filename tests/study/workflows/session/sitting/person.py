@@ -12,7 +12,7 @@ class Person(SimulatedDisplay):
 
     def __init__(self, clock, seed=11):
         super().__init__(find_observer("ideal", seed), seed, clock)
-        self.calls, self.questions, self.playing, self.told = [], [], [], []
+        self.calls, self.questions, self.playing, self.told, self.welcomes = [], [], [], [], []
         self.at_question = lambda question: None
         self.at_pause = lambda: None
         self.demo = [PlayDemo(1, 1), PlayDemo(2, 2), DemoDone()]
@@ -32,6 +32,7 @@ class Person(SimulatedDisplay):
 
     def welcome(self, notice):
         self.calls.append("welcome")
+        self.welcomes.append(notice)
 
     def choose_demo(self, menu, sign_of_life):
         self.calls.append("demo")

@@ -165,6 +165,21 @@ def test_leaving_from_a_pause_can_be_resumed(plan, small_protocol, seat, person)
     assert (end.end_reason, end.withdrawn) == ("the participant left", False)
 
 
+def test_a_person_who_comes_back_is_told_of_the_runs_that_are_left_alone(plan, small_protocol, seat, person, clock):
+    def leave(notice, sign_of_life):
+        raise KeyboardInterrupt
+
+    person.rest = leave  # after the training
+    with pytest.raises(UserInterruptError):
+        conduct_new(plan(small_protocol), "simulated", seat)
+    again = Person(clock)
+    folder = SessionFolder(plan(small_protocol).data_folder / "P01_001")
+    conduct_resumed(folder, "simulated", Participant(display=again, hand=again, clock=clock))
+    (first,), (second,) = person.welcomes, again.welcomes
+    assert (first.training_runs, second.training_runs) == (1, 0)
+    assert first.runs == second.runs == len(small_protocol.stimulus.frequencies_hz)
+
+
 def test_a_note_is_not_lost_where_the_program_ends_before_it_was_logged(plan, small_protocol, seat, person, tmp_path):
     folder = SessionFolder(tmp_path / "data" / "P01_001")
 
