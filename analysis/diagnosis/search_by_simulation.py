@@ -117,6 +117,11 @@ class _ImpactSearch:
         self._play_result: SearchResult | None = None
         self._searched_step_count = -1  # number of effects of the result that was last searched; -1: none yet
 
+    def explain_before_second_effect(self, result: SearchResult) -> SearchResult:
+        """Return the result as `explain_before_third_effect` does where no single effect was worth adding; else the
+        result unchanged. Play takes no longer than a search of pairs of which neither effect alone is worth adding."""
+        return result if result.found.steps else self.explain_before_third_effect(result)
+
     def explain_before_third_effect(self, result: SearchResult) -> SearchResult:
         """Return the result with play, where the drive repeats, the mismatch is unexplained, and play explains all of
         it; else the result unchanged, also with hum below the mains frequency. A third effect would take much time and
@@ -201,26 +206,16 @@ def _search(
 ) -> SearchOutcome:
     """Search without clean recordings; unless the model was fitted to the recordings, also for laws outside the
     catalogue where `settings` asks for them, and again with a wider bound where needed."""
-    further_searches = FurtherSearches(before_thirds=impact_search.explain_before_third_effect)
+    play_searches = impact_search.explain_before_second_effect, impact_search.explain_before_third_effect
+    further_searches = FurtherSearches(*play_searches)
     if settings.discovery and not settings.fitted:
         # Imported here, because only a diagnosis that searches for laws needs their grammar.
         from analysis.diagnosis.discovery.add_laws import LawSearch
 
         law_search = LawSearch(progress, settings.time_left)
-
-        def explain_before_third_effect(pair_result: SearchResult) -> SearchResult:
-            """Add rattling play; where that changes nothing, search for laws."""
-            result_with_play = impact_search.explain_before_third_effect(pair_result)
-            is_unchanged = result_with_play.found is pair_result.found
-            return (
-                _skip_law_search_with_hum(law_search.add_laws_before_third_effect)(pair_result)
-                if is_unchanged
-                else result_with_play
-            )
-
         further_searches = FurtherSearches(
-            _skip_law_search_with_hum(law_search.add_short_laws),
-            explain_before_third_effect,
+            _search_in_turn(play_searches[0], _skip_law_search_with_hum(law_search.add_short_laws)),
+            _search_in_turn(play_searches[1], _skip_law_search_with_hum(law_search.add_laws_before_third_effect)),
             _skip_law_search_with_hum(law_search.add_laws),
         )
     result = search_effects(context, catalogue, progress, settings.time_left, further_searches)
@@ -228,6 +223,18 @@ def _search(
     if not settings.fitted:
         result = repeat_with_wider_bound(context, result, catalogue, progress, settings.time_left)
     return SearchOutcome(result, ModelErrorFloor())
+
+
+def _search_in_turn(
+    search: Callable[[SearchResult], SearchResult], next_search: Callable[[SearchResult], SearchResult]
+) -> Callable[[SearchResult], SearchResult]:
+    """Combine two searches: the second one is made where the first one leaves the explanation unchanged."""
+
+    def search_both(result: SearchResult) -> SearchResult:
+        searched = search(result)
+        return next_search(result) if searched.found is result.found else searched
+
+    return search_both
 
 
 def _skip_law_search_with_hum(

@@ -48,13 +48,16 @@ def refine_band_power(weighted_problem: BandPowerProblem, start: BandPowerFit, t
 
 def weight_by_chance_variation(problem: BandPowerProblem, fit: BandPowerFit) -> BandPowerProblem:
     """Weight a problem by the chance variation of `fit`: each band's standard deviation over `ENSEMBLE_SIZE`
-    simulations. Its predictions are averaged over as many."""
+    simulations. Its predictions are averaged over as many, or are of a single one where chance does not change the
+    weights: without impacts all simulations agree."""
 
     def predict(member: int) -> FloatArray:
         return problem.predict(fit.deviations, perturb(fit.hypothesis, member))
 
     chance_deviations = np.std(np.array(list(problem.map_(predict, range(ENSEMBLE_SIZE)))), axis=0, ddof=1)
-    return replace(problem, spread=chance_deviations, ensemble=ENSEMBLE_SIZE)
+    weighted = replace(problem, spread=chance_deviations, ensemble=ENSEMBLE_SIZE)
+    is_certain = np.allclose(weighted.weights, replace(problem, spread=0.0).weights)
+    return replace(weighted, ensemble=1) if is_certain else weighted
 
 
 def _differentiate_by_deviations(problem: BandPowerProblem, fit: BandPowerFit) -> FloatArray:

@@ -6,12 +6,12 @@ samples. Effects that depend on time cannot be compared there and are fitted on 
 motion-dependent forces, simulations are slow, and both kinds share the time by their gains.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import Hypothesis, has_motion_forces
+from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses, has_motion_forces
 from analysis.diagnosis.errors.output_error import (
     Fitted,
     Sensitivity,
@@ -108,16 +108,49 @@ def find_first_fits(
 def compare_plausible_fits(
     context: SearchContext, base: Fitted, fits: Sequence[Fitted], evidence: Evidence
 ) -> tuple[FittedCandidate, ...]:
-    """Compare the candidates of these first fits, the preferred one first, without those that predict nothing beyond
+    """Compare the candidates of these first fits (`compare_candidates`), and select from them (`select_plausible`)."""
+    return select_plausible(context, base, compare_candidates(context, base, fits), evidence)
+
+
+def select_plausible(
+    context: SearchContext, base: Fitted, candidates: Iterable[FittedCandidate], evidence: Evidence
+) -> tuple[FittedCandidate, ...]:
+    """Select the candidates, the preferred one first, then by their errors, without those that predict nothing beyond
     `base` and those with a parameter outside the range of the data (such as a limit above the largest command)."""
     return move_preferred_first(
         [
             candidate
-            for candidate in compare_candidates(context, base, fits)
+            for candidate in sorted(candidates, key=lambda candidate: candidate.score.mean_log_error)
             if not has_unpredicted_channel(context.measure, base, candidate.fitted)
             and is_newest_within_data(candidate.fitted.hypothesis, evidence)
         ]
     )
+
+
+def combine_known_fits(
+    context: SearchContext,
+    base: Fitted,
+    candidates: Sequence[FittedCandidate],
+    effects: Sequence[Effect],
+    sites: tuple[int, ...],
+    largest_cost: float,
+) -> list[Fitted]:
+    """Combine the effects of `base` with those of these effects that the candidates have at these sites, without
+    fitting: the best of each effect, with a smaller cost than the largest; the model's parameters are those of the
+    candidate or of `base`, whichever fit better. candidates: of one effect each."""
+    best_by_name: dict[str, Fitted] = {}
+    for candidate in candidates:
+        (claim,) = candidate.fitted.hypothesis.claims
+        is_exclusive = any(are_exclusive(base_claim, claim) for base_claim in base.hypothesis.claims)
+        if claim.effect not in effects or claim.sites != sites or is_exclusive:
+            continue
+        hypothesis = combine_hypotheses(base.hypothesis, candidate.fitted.hypothesis)
+        for deviations in (candidate.fitted.deviations, base.deviations):
+            combined_fit = evaluate_fit(context.measure, context.tuning, deviations, hypothesis)
+            best_fit = best_by_name.get(claim.effect.name)
+            if combined_fit.cost < (largest_cost if best_fit is None else best_fit.cost):
+                best_by_name[claim.effect.name] = combined_fit
+    return list(best_by_name.values())
 
 
 def _suggest_hypotheses(

@@ -18,7 +18,14 @@ from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.limits import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.next_effect import Step, compare_plausible_fits, find_first_fits, find_next_effect
+from analysis.diagnosis.search.next_effect import (
+    Step,
+    combine_known_fits,
+    compare_plausible_fits,
+    find_first_fits,
+    find_next_effect,
+    select_plausible,
+)
 from analysis.diagnosis.search.parsimony import (
     has_improbable_deviations,
     has_small_error,
@@ -198,15 +205,15 @@ def exchange_first_for_relatives(
     """Exchange the first effect for a related one (`list_relatives`) at the same site, because the fits of related
     effects may differ only once the second effect is in the model.
 
-    The candidates start from the explanation without the first effect, the other values unchanged; only a candidate
-    with a smaller cost than the explanation is fitted further. The first effect is among the candidates, so that a
-    refinement must reduce the error by as much as in any step. Unchanged where the error is at most `EXPLAINED_ERROR`,
-    effects may not be changed (`_can_exchange`), the first effect has no relatives in the catalogue, or
-    `_exchange_first` finds no replacement.
+    The candidates start from the explanation without the first effect, the other values unchanged, or from their fits
+    in the first round (`combine_known_fits`); only one with a smaller cost than the explanation is fitted further. The
+    first effect is among them, so that a refinement must reduce the error by as much as in any step. Unchanged where
+    the error is at most `EXPLAINED_ERROR`, effects may not be changed (`_can_exchange`), the first effect has no
+    relatives in the catalogue, or nothing replaces it (`_exchange_first`). Where the time ends, fits count as they are.
     """
     related_effects = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
-    is_improvable = explanation.after.score.worst_channel > EXPLAINED_ERROR
-    if len(related_effects) < 2 or not is_improvable or not _can_exchange(context, explanation, time_left):
+    is_small = explanation.after.score.worst_channel <= EXPLAINED_ERROR
+    if len(related_effects) < 2 or is_small or not _can_exchange(context, explanation, time_left):
         return explanation
     limited_context, last_step = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
     sites = explanation.steps[0].fitted.hypothesis.claims[-1].sites
@@ -215,18 +222,20 @@ def exchange_first_for_relatives(
         """Compare the related effects in place of the first: as `compare_replacements` of `_exchange_first`."""
         base = _omit_effect(limited_context, last_step, 0).fitted
         evidence = gather_evidence(limited_context.measure, limited_context.tuning, base)[0]
-        first_fits = find_first_fits(
-            limited_context, related_effects, base, evidence, _make_exchange_step(progress), sites
-        )
-        improved_fits = [fitted for fitted in first_fits if fitted.cost < last_step.fitted.cost]
+        rivals, largest_cost = explanation.rounds[0][1:], last_step.fitted.cost
+        fits = combine_known_fits(context, base, rivals, related_effects, sites, largest_cost)
+        known_effects = [fitted.hypothesis.claims[-1].effect for fitted in fits]
+        others = [effect for effect in related_effects if effect not in known_effects]
+        try:
+            fits += find_first_fits(limited_context, others, base, evidence, _make_exchange_step(progress), sites)
+            fits = sorted((fit for fit in fits if fit.cost < largest_cost), key=lambda fit: fit.cost)
+            candidates = compare_plausible_fits(limited_context, base, fits, evidence)
+        except OutOfTimeError:
+            candidates = select_plausible(context, base, [context.score_fit(fitted) for fitted in fits], evidence)
         current_candidate = _move_first_to_end(limited_context, last_step)
-        ranked_candidates = move_preferred_first(
-            [*compare_plausible_fits(limited_context, base, improved_fits, evidence), current_candidate]
-        )
-        # The other effects are refitted only where the first effect is replaced.
-        return explanation if ranked_candidates[0] is current_candidate else remove_effect(
-            limited_context, explanation, 0
-        ), ranked_candidates
+        ranked_candidates = move_preferred_first([*candidates, current_candidate])
+        is_kept = ranked_candidates[0] is current_candidate
+        return explanation if is_kept else remove_effect(context, explanation, 0), ranked_candidates
 
     return _exchange_first(context, explanation, compare_relatives) or explanation
 
@@ -248,8 +257,7 @@ def _can_exchange(context: SearchContext, explanation: Explanation, time_left: T
 
 
 def _make_exchange_step(progress: Progress) -> Step:
-    """Make the step that the progress display shows for an exchange; 0.8: share of the search that precedes it.
-    Chosen."""
+    """Make the step that the progress display shows for an exchange, after a share of 0.8 of the search (chosen)."""
     return Step("looking again for the first effect", 0.8, progress)
 
 
@@ -258,11 +266,9 @@ def _exchange_first(
     explanation: Explanation,
     compare_replacements: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]],
 ) -> Explanation | None:
-    """Replace the first effect by the preferred candidate, which becomes the last in the order. None without
-    candidates, where that one is excluded or neither worthwhile (`is_worthwhile`) nor decisively more probable
-    (`is_more_probable`), the time is over, or the comparison crashes.
-    compare_replacements: returns the explanation without the first effect, and the candidates in its place, the
-    preferred one first."""
+    """Replace the first effect by the preferred candidate, which becomes the last. None without candidates, where that
+    one is excluded or neither `is_worthwhile` nor `is_more_probable`, the time is over, or the comparison crashes.
+    compare_replacements: returns the explanation without the first effect, and the candidates, the preferred first."""
 
     def compare_within_time() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
         """Compare the replacements; None where the time is over."""

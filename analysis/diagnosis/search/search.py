@@ -1,7 +1,7 @@
 """Search for missing effects with a given model: forward selection, backward elimination, verdict.
 
 1. Forward selection (`add_effects`) uses the samples to fit and to choose by. After a second effect, the first may be
-   exchanged for another of its family; after the last, for any effect that fits better (`revise_selection`).
+   exchanged for another of its family, then, as after a third, for any that fits better (`revise_selection`).
 2. Backward elimination (`prune`) removes effects without which the others, refitted, fit as well; those that remove
    too little of the mismatch, or none of the held-out error where it was small; and those that the data do not
    determine (`identifiability`: no interval, or profile likelihood of an only amplitude, excludes the null value).
@@ -10,9 +10,9 @@
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), a part
    of them is opened, that is, used to fit and to choose by, and the search repeated: all but the loudest segments; else
    the first half of each stretch, or every other of more parts. The part still held out must confirm what this finds.
-5. Where the catalogue leaves a mismatch, `FurtherSearches` look beyond it: before a second effect for laws outside the
-   catalogue (`discovery`), because one law that explains everything is a shorter description than two; before a third,
-   which takes longer, for rattling play (`impacts`), then laws; and at the end for laws (`_choose_early_or_full`).
+5. Where the catalogue leaves a mismatch, `FurtherSearches` look beyond it: before a second effect for rattling play
+   (`impacts`), if no single effect is worth adding, then for a law outside the catalogue (`discovery`), a shorter
+   description than two effects; before a third effect for play, then laws; at last laws (`_choose_early_or_full`).
 6. Where a mismatch remains, or three effects are needed, and a parameter of the model is at its bound, the search is
    repeated with a wider bound (`repeat_with_wider_bound`): a model that was fitted to this device may have absorbed
    missing physics. The new result is used if it explains what the first does not, or with fewer effects.
@@ -88,7 +88,7 @@ class FurtherSearches:
     its own effects named in place of the catalogue's, with additional candidates, or unchanged."""
 
     before_pairs: Callable[[SearchResult], SearchResult] = lambda result: result
-    """Called before a second effect is searched for: names only what is a shorter description than two effects."""
+    """Called before a second effect is searched for: names only play, or a shorter description than two effects."""
     before_thirds: Callable[[SearchResult], SearchResult] = lambda result: result
     """Called before a third effect is searched for. What explains the whole mismatch ends the search."""
     at_end: Callable[[SearchResult], SearchResult] = lambda result: result
@@ -108,8 +108,9 @@ def search_effects(
     first_result = SearchResult(context, single, Judgement("unexplained", False))
     if is_worth_searching(context, single, single.after) and judge(single).verdict != "explained":
         first_result = further.before_pairs(first_result)
-    is_explained = first_result.judgement.verdict == "explained"
-    if is_explained and first_result.found.after.score.worst_channel <= EXPLAINED_ERROR:
+    found = first_result.found
+    has_small_error = found.statistic is not None or found.after.score.worst_channel <= EXPLAINED_ERROR
+    if first_result.judgement.verdict == "explained" and has_small_error:
         return first_result
     pair = add_effects(context, catalogue, single, progress, time_left, max_effects=2)
     pair = exchange_first_for_relatives(context, pair, catalogue, progress, time_left)
@@ -169,10 +170,13 @@ def _search_third_effect(
     time_left: TimeBudget,
     at_end: Callable[[SearchResult], SearchResult],
 ) -> SearchResult:
-    """Continue the search after at most two effects: a third effect, exchange, elimination, and opened held-out samples
+    """Continue the search after at most two effects: exchange, a third effect, elimination, and opened held-out samples
     (steps 1 to 5). pair: the explanation by up to two effects. at_end: `FurtherSearches.at_end`."""
+    pair = exchange_first_effects(context, pair, catalogue, progress, time_left)
     final = add_effects(context, catalogue, pair, progress, time_left)
-    final = _exchange_and_prune(context, final, catalogue, progress, time_left)
+    if final.steps != pair.steps:
+        final = exchange_first_effects(context, final, catalogue, progress, time_left)
+    final = _prune_guarded(context, final, time_left)
     judgement = _judge_with_prediction(context, final)
     earlier = SearchResult(context, final, judgement, list_remarks(final))
     # Effects that fit their samples are kept even if unconfirmed: another may show in the held-out samples alone.
@@ -231,7 +235,8 @@ def _repeat_with_opened(
     is_continued = fit is earlier.found.after and is_near_noise(earlier.found)
     previous_steps = earlier.found.rounds[: len(earlier.found.steps)] if is_continued else ()
     final = explain(context, catalogue, progress, time_left, previous_steps)
-    final = _exchange_and_prune(context, final, catalogue, progress, time_left)
+    final = exchange_first_effects(context, final, catalogue, progress, time_left)
+    final = _prune_guarded(context, final, time_left)
     remark = {0: MILDER_TEST_USED, HALVES: TEST_HALF_USED}.get(parts, TEST_PARTS_USED)
     return SearchResult(context, final, _judge_with_prediction(context, final), (remark, *list_remarks(final))), parts
 
@@ -280,14 +285,11 @@ def _list_effect_sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
     return {(claim.effect.name, site) for claim in candidate.fitted.hypothesis.claims for site in claim.sites}
 
 
-def _exchange_and_prune(
-    context: SearchContext, initial: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
-) -> Explanation:
-    """Exchange and remove effects after forward selection; where the removal raises an exception, nothing is named."""
-    unnamed = replace(initial, after=initial.retuned, steps=())
-    exchanged = exchange_first_effects(context, initial, catalogue, progress, time_left)
-    newest = initial.steps[-1].newest if initial.steps else ""
-    return context.guard.run(newest, "the final check", lambda: prune(context, exchanged, time_left), unnamed)
+def _prune_guarded(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
+    """Remove needless effects (`prune`); where that raises an exception, nothing is named."""
+    unnamed = replace(explanation, after=explanation.retuned, steps=())
+    newest = explanation.steps[-1].newest if explanation.steps else ""
+    return context.guard.run(newest, "the final check", lambda: prune(context, explanation, time_left), unnamed)
 
 
 def _judge_with_prediction(context: SearchContext, explanation: Explanation) -> Judgement:

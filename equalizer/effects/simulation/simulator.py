@@ -6,6 +6,7 @@ Sizes: n samples, m driven axes, p response channels; c coordinates of the model
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import blake2b
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,12 @@ from equalizer.effects.simulation.sensor_path import apply_low_pass, clip_to_ran
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
+
+KEPT_BYTES = 2**27
+"""Largest size (bytes) of all motions that are kept for further simulations (`_recall_rows`). Chosen: some forty
+motions of three axes over a minute at 1 kHz, as many as the derivatives by the parameters of a backlash need."""
+_kept_rows: dict[tuple[object, ...], tuple[FloatArray, FloatArray]] = {}
+"""Results of `_simulate_rows` by all that determines them, the last used at the end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,10 +159,10 @@ def _simulate_motion(
 ) -> SimulationResult:
     """Simulate the motion, with the true response before the sensor. with_axes: whether to output the driven axes,
     whose arrays are else (n, 0)."""
-    bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
-    motion_rows, port_forces = simulate_bodies(
-        bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), with_axes, restarts
-    )
+    bodies = build_bodies(model, effects)
+    # Only simulations with motion-dependent forces take longer than a comparison of what determines them.
+    simulate_rows = _recall_rows if bodies.actions else _simulate_rows
+    motion_rows, port_forces = simulate_rows(model, commands, sampling, effects, with_axes, restarts)
     axis_count, output_count, port_count = (
         bodies.axes if with_axes else 0,
         bodies.structure.outputs,
@@ -169,6 +176,52 @@ def _simulate_motion(
         motion_rows[:, port_count : port_count + axis_count],
         port_forces[:, :axis_count],
     )
+
+
+def _simulate_rows(
+    model: MechanicalModel,
+    commands: FloatArray,
+    sampling: tuple[float, Hold],
+    effects: Sequence[PlacedEffect],
+    with_axes: bool,
+    restarts: Restarts | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Simulate the two arrays of `simulate_bodies`, without the sensor."""
+    bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
+    return simulate_bodies(
+        bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), with_axes, restarts
+    )
+
+
+def _recall_rows(
+    model: MechanicalModel,
+    commands: FloatArray,
+    sampling: tuple[float, Hold],
+    effects: Sequence[PlacedEffect],
+    with_axes: bool,
+    restarts: Restarts | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return copies of what `_simulate_rows` returned for the same motion, or simulate it: hypotheses that differ in
+    the effects of the sensor alone have the same motion. At most `KEPT_BYTES` are kept."""
+    matrices = (model.mass, model.damping, model.stiffness, model.input, model.output)
+    samples = np.asarray(commands)
+    causes = (
+        *((matrix.shape, matrix.tobytes()) for matrix in matrices),
+        *(samples.shape, samples.dtype, blake2b(samples.tobytes()).digest()),
+        *(model.quantity, model.actuator, sampling, with_axes),
+        None if restarts is None else (restarts.sample_indices.tobytes(), restarts.states.tobytes()),
+        tuple(
+            (placed.effect.action, placed.sites, tuple(placed.values.items()))
+            for placed in effects
+            if not isinstance(placed.effect.action, OnResponse)
+        ),
+    )
+    rows = _kept_rows.pop(causes, None) or _simulate_rows(model, commands, sampling, effects, with_axes, restarts)
+    _kept_rows[causes] = rows
+    # Copies of keys and values, and a default, because another thread may simulate meanwhile.
+    while sum(array.nbytes for kept in tuple(_kept_rows.values()) for array in kept) > KEPT_BYTES:
+        _kept_rows.pop(tuple(_kept_rows)[0], None)
+    return rows[0].copy(), rows[1].copy()
 
 
 def _apply_sensor(

@@ -9,6 +9,7 @@ import pytest
 
 import analysis.diagnosis.errors.refine_band_power as refine_module
 import analysis.diagnosis.search.impacts as impacts
+import analysis.diagnosis.search.search as search
 import analysis.diagnosis.search.second_effect_with_play as second_effect
 import analysis.diagnosis.search_by_simulation as search_by_simulation
 from analysis.diagnosis.errors.band_power_fit import BandPowerProblem
@@ -16,7 +17,7 @@ from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import make_tuning
-from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import CountedBudget
@@ -121,6 +122,17 @@ def test_a_refinement_is_compared_with_its_start_under_the_same_weights(true_lev
     monkeypatch.setattr(refine_module, "fit_band_power", lambda problem, best, steps: best)
     start = SimpleNamespace(hypothesis=friction(1.0), deviations=np.zeros(0), cost=50.0)
     assert refine_module.refine_band_power(VIEW, start, CountedBudget(9)).cost == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("scatter", "ensemble"), [(0.0, 1), (1e-6, 1), (0.01, refine_module.ENSEMBLE_SIZE)])
+def test_predictions_are_averaged_where_chance_changes_the_weights(monkeypatch, scatter, ensemble):
+    random = np.random.default_rng(5)
+    monkeypatch.setattr(BandPowerProblem, "predict", lambda *_: scatter * random.standard_normal((2, 9, 1)))
+    power = SimpleNamespace(measured=np.zeros((2, 9, 1)), stretches=[SimpleNamespace(role="fit")] * 2)
+    fit = SimpleNamespace(hypothesis=friction(1.0), deviations=np.zeros(0))
+    weighted = refine_module.weight_by_chance_variation(BandPowerProblem(power, SimpleNamespace(), map), fit)
+    assert weighted.ensemble == ensemble
+    assert np.allclose(weighted.spread.mean(), scatter, atol=0.3 * scatter)
 
 
 def test_of_each_effect_only_its_best_start_is_kept(true_level):
@@ -228,6 +240,29 @@ def test_a_search_for_play_that_ends_early_is_reported(monkeypatch, calls, said)
     context, explanation = SimpleNamespace(certain=(), guard=Guard()), SimpleNamespace(steps=())
     result = search.explain_at_end(SearchResult(context, explanation, Judgement("unexplained", named=False)))
     assert (result.judgement.verdict, result.remarks) == ("unexplained", said)
+
+
+@pytest.mark.parametrize("steps", [0, 1])
+def test_play_is_looked_for_before_pairs_where_no_single_effect_is_worth_adding(recorded, monkeypatch, steps):
+    context, explanation, floors = recorded
+    fitting = SimpleNamespace(chosen=SimpleNamespace(floors=floors))
+    play_search = search_by_simulation._ImpactSearch(
+        fitting, CATALOGUE, SimpleNamespace(time_left=CountedBudget(9)), lambda said, share: None
+    )
+    with_play = replace(explanation, statistic=Statistic(np.ones(1), np.ones(0)))
+    found, added = SearchResult(context, with_play, Judgement("explained", named=True)), []
+
+    def add(context, catalogue, selected, progress, time_left, max_effects=3):
+        added.append(max_effects)
+        return replace(explanation, steps=(explanation.after,) * steps)
+
+    monkeypatch.setattr(search, "start_explanation", lambda *_: explanation)
+    monkeypatch.setattr(search, "add_effects", add)
+    monkeypatch.setattr(search, "exchange_first_for_relatives", lambda context, pair, *_: pair)
+    monkeypatch.setattr(search_by_simulation._ImpactSearch, "_search_for_play", lambda *_: found)
+    searches = search.FurtherSearches(play_search.explain_before_second_effect, lambda result: found)
+    assert search.search_effects(context, CATALOGUE, lambda said, share: None, further=searches) is found
+    assert added == ([1] if steps == 0 else [1, 2])
 
 
 @pytest.mark.slow

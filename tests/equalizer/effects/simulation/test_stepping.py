@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import equalizer.effects.simulation.simulator as simulator
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import AxisForce, PlacedEffect
 from equalizer.effects.simulation.bodies import Restarts, build_bodies, simulate_bodies
@@ -136,6 +137,7 @@ STIFF = ("coulomb_friction", (0,), {"level": 0.4})
 SMOOTH = ("quadratic_damping", (1,), {"coefficient": 5.0})
 LOOSE = ("loose_joint", (0,), {"gap": 1e-4, "stiffness": 2e3, "slip": 0.05})
 SEVERAL = [STIFF, SMOOTH, LOOSE]
+TONE = {"frequency": 50.0, "phase": 0.0}
 ALIKE = [("coulomb_friction", (0, 1, 2), {"level": 0.2}), ("hardening_stiffness", (2,), {"k3": 1e7})]
 
 
@@ -249,3 +251,39 @@ def test_pieces_begun_in_the_states_of_the_whole_go_on_as_the_whole_does(bench, 
     np.testing.assert_allclose(pieces.position, whole.position[kept], rtol=0, atol=1e-12)
     from_rest = simulate_response(model, commands[kept], RATE_HZ, effects)
     assert np.abs(from_rest.position[:60] - whole.position[90:150]).max() > 1e-5
+
+
+def test_a_motion_under_forces_is_simulated_once_for_all_effects_of_the_sensor(monkeypatch):
+    simulated, simulate = [], simulator.simulate_bodies
+
+    def simulate_and_count(*arguments):
+        simulated.append(arguments)
+        return simulate(*arguments)
+
+    def read_response(level, hum, driven):
+        effects = placed(("coulomb_friction", (0,), {"level": level}), ("mains_hum", (0,), {"amplitude": hum, **TONE}))
+        return simulate_response(springs(1.0), driven, RATE_HZ, effects).response
+
+    monkeypatch.setattr(simulator, "simulate_bodies", simulate_and_count)
+    monkeypatch.setattr(simulator, "_kept_rows", {})
+    command = np.sin(np.arange(SAMPLES) / 9.0)[:, None]
+    without_hum = read_response(0.4, 0.0, command)
+    tone = 0.3 * np.sin(2 * np.pi * TONE["frequency"] * np.arange(SAMPLES) / RATE_HZ)[:, None]
+    np.testing.assert_allclose(read_response(0.4, 0.3, command), without_hum + tone, atol=1e-12)
+    without_hum[:] = 0  # the caller's own array
+    assert np.abs(read_response(0.4, 0.0, command)).max() > 0
+    assert len(simulated) == 1
+    # What moves the device in another way is simulated, also where the same array has other samples.
+    assert not np.array_equal(read_response(0.3, 0.0, command), read_response(0.4, 0.0, command))
+    before = read_response(0.4, 0.0, command)
+    command *= 2
+    assert not np.array_equal(read_response(0.4, 0.0, command), before)
+    assert len(simulated) == 3
+
+
+def test_kept_motions_have_a_limited_size(monkeypatch):
+    monkeypatch.setattr(simulator, "_kept_rows", {})
+    monkeypatch.setattr(simulator, "KEPT_BYTES", 5 * SAMPLES * 8)  # a motion has two rows of `SAMPLES`
+    for level in (0.1, 0.2, 0.3):
+        simulate_response(springs(1.0), np.ones((SAMPLES, 1)), RATE_HZ, placed((*STIFF[:2], {"level": level})))
+    assert [causes[-1][0][-1] for causes in simulator._kept_rows] == [(("level", 0.2),), (("level", 0.3),)]
