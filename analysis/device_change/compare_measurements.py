@@ -19,6 +19,7 @@ from analysis.device_change.measure_device import (
 )
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.recording import Recording
+from equalizer.signals.recording_checks import format_channels
 from equalizer.signals.signal import FloatArray
 
 
@@ -83,9 +84,10 @@ def compare_measurements(
     """Compare two measurements of a device: all numbers, changed or not. baseline, recording: the same excitation, at
     the acceptance and today.
 
-    Raises NotMeasurableError where `measure_device` does, where the excitations or channels differ, or where no
-    frequency is reliable in both."""
+    Raises NotMeasurableError where `measure_device` does, where the rates, channels, units or excitations differ, or
+    where no frequency is reliable in both."""
     limits = limits or ChangeLimits()
+    _require_same_signals(baseline, recording)
     _require_same_excitation(baseline, recording)
     accepted, today = measure_device(baseline), measure_device(recording)
     return (
@@ -94,6 +96,17 @@ def compare_measurements(
         *_find_lost_bands(accepted.response, today.response, limits),
         *_compare_noise(accepted, today, limits),
     )
+
+
+def _require_same_signals(baseline: Recording, recording: Recording) -> None:
+    """Raise NotMeasurableError unless both have the same sample rate, and the same channels in the same units."""
+    for name, accepted, today in (
+        ("sample rate", f"{baseline.sample_rate_hz:.12g} Hz", f"{recording.sample_rate_hz:.12g} Hz"),
+        ("command", format_channels(baseline.command), format_channels(recording.command)),
+        ("response", format_channels(baseline.response), format_channels(recording.response)),
+    ):
+        if accepted != today:
+            raise NotMeasurableError(f"the {name} is {today} now, but was {accepted} at the acceptance")
 
 
 def _require_same_excitation(baseline: Recording, recording: Recording) -> None:
@@ -115,10 +128,7 @@ def _require_same_excitation(baseline: Recording, recording: Recording) -> None:
 
 
 def _compare_friction(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
-    """Compare the friction of each axis. A NaN of either recording counts as a change. Raises NotMeasurableError where
-    the axes differ."""
-    if accepted.response.input_channels != today.response.input_channels:
-        raise NotMeasurableError("the channels of the two recordings differ")
+    """Compare the friction of each axis. A NaN of either recording counts as a change."""
     for axis, channel in enumerate(accepted.response.input_channels):
         accepted_n, today_n = float(accepted.friction_n[axis]), float(today.friction_n[axis])
         error = float(np.hypot(accepted.friction_error_n[axis], today.friction_error_n[axis]))
@@ -130,9 +140,7 @@ def _compare_friction(accepted: DeviceMeasures, today: DeviceMeasures, limits: C
 
 def _compare_responses(accepted: FrequencyResponse, today: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
     """Compare gain and shape of the response to each command, at the frequencies that are reliable in both recordings;
-    gains as logarithms. Raises NotMeasurableError where the channels differ or there is no such frequency."""
-    if accepted.input_channels != today.input_channels or accepted.output_channels != today.output_channels:
-        raise NotMeasurableError("the channels of the two recordings differ")
+    gains as logarithms. Raises NotMeasurableError where there is no such frequency."""
     common_hz = np.intersect1d(accepted.frequency_hz[accepted.reliable], today.frequency_hz[today.reliable])
     if not len(common_hz):
         raise NotMeasurableError("no frequency is reliable in both recordings")

@@ -28,7 +28,7 @@ from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.limits import FAULT_GAIN_FACTOR
 from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError, ModelErrorFloor
-from analysis.diagnosis.result.assemble_findings import assemble_findings
+from analysis.diagnosis.result.assemble_findings import assemble_findings, list_reading_units
 from analysis.diagnosis.result.candidates import (
     add_balances_with_fitted_model,
     add_balances_with_given_model,
@@ -44,12 +44,12 @@ from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.search_by_simulation import SearchOutcome, make_search_context, search_by_simulation
 from analysis.diagnosis.types import Mapper, Progress
-from equalizer.effects.placing import shorten_axis_name
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
+    from analysis.diagnosis.document import Diagnosis
 
 
 TOO_SHORT_TO_NAME = "the recordings are so short that other laws would explain them equally well"
@@ -95,6 +95,7 @@ def _diagnose_by_balance(
     # Imported on demand, to shorten the start of the program.
     from analysis.diagnosis.confirm.confirm_laws import has_open_parameter, search_by_balance
     from analysis.diagnosis.confirm.force_balance_measures import list_fitting_measures
+    from analysis.diagnosis.confirm.laws_for_simulation import judge_special_cases
 
     for measure_index, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
         progress("fitting the named laws", 0.2 + 0.3 * measure_index)
@@ -103,6 +104,7 @@ def _diagnose_by_balance(
         search_laws = partial(search_by_balance, context, balances, noise_known)
         result = settings.guard.run(BALANCE, "the fit of its laws", search_laws, None)
         if result is not None and not (fitting.is_narrow_band and has_open_parameter(result)):
+            balances = judge_special_cases(balances, result.found.steps[-1].fitted.hypothesis.claims)
             return _assemble(recordings, settings, fitting, SearchOutcome(result, ModelErrorFloor()), balances)
     return None
 
@@ -263,24 +265,34 @@ def _assemble(
     maps: tuple[StateMaps, ...] = settings.guard.run("the map of states", "its calculation", compute_maps, ())
     guard_remarks = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear_remarks = describe_linear_terms(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
-    remarks = tuple(
-        dict.fromkeys((*guard_remarks, *fitting.chosen.remarks, *result.remarks, *linear_remarks, *findings.remarks))
-    )
+    part_remarks = _compare_parts(settings, diagnosis, balances, channels)
+    remarks = (*guard_remarks, *part_remarks, *fitting.chosen.remarks, *result.remarks, *linear_remarks)
     errors_by_balance = collect_balance_errors(diagnosis, balances, channels)
     named_effects = {effect.effect for effect in diagnosis.effects}
     curves = tuple(curve for curve in findings.signatures if curve.effect in named_effects)
-    completed = replace(findings, diagnosis=diagnosis, remarks=remarks, fitted=settings.fitted, signatures=curves)
+    completed = replace(
+        findings,
+        diagnosis=diagnosis,
+        remarks=tuple(dict.fromkeys((*remarks, *findings.remarks))),
+        fitted=settings.fitted,
+        signatures=curves,
+    )
     return replace(
         completed,
         balance_errors=errors_by_balance,
         state_maps=maps,
-        reading_units=_list_reading_units(recordings[0]),
+        reading_units=list_reading_units(recordings[0]),
     )
 
 
-def _list_reading_units(recording: Recording) -> dict[str | None, str]:
-    """List the units of the response channels: `Findings.reading_units`."""
-    channels, units = recording.response.channels, recording.response.units
-    names = (shorten_axis_name(channel, channels) for channel in channels)
-    reading_units: dict[str | None, str] = dict(zip(names, units, strict=True))
-    return reading_units | ({None: units[0]} if len(set(units)) == 1 else {})
+def _compare_parts(
+    settings: DiagnosisSettings, diagnosis: "Diagnosis", balances: "Sequence[Balance]", channels: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Compare the named laws of the balances between the parts (`describe_changed_strengths`)."""
+    if not any(balance.named for balance in balances):
+        return ()
+    from analysis.diagnosis.result.plausibility import describe_changed_strengths
+
+    compare = partial(describe_changed_strengths, diagnosis.effects, balances, channels)
+    sentences: tuple[str, ...] = settings.guard.run("the comparison of parts", "its calculation", compare, ())
+    return sentences

@@ -99,7 +99,7 @@ def format_error(error: float | None) -> str:
     """Format an error relative to the signal: "14 %", from 1000 % on "12 times", and "unknown" for None."""
     if error is None:
         return "unknown"
-    return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
+    return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{float(f'{error:.3g}'):g} times"
 
 
 def format_error_of_signal(error: float) -> str:

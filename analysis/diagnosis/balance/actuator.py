@@ -16,6 +16,7 @@ from typing import cast
 
 import numpy as np
 
+from analysis.diagnosis.balance.actuator_equivalents import ONE_BODY_REASON, halves_one_body_error
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
@@ -85,7 +86,7 @@ def find_balance(
     motions: Sequence[Motion], driven: DrivenAxis, excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> Balance:
     """Find the balance of one axis: laws of the motion and, where significant, a law of the command. With a named one,
-    the laws of the motion are searched again for the force that it gives."""
+    the laws of the motion are searched again for the force that it gives; that must halve the error of one body."""
     axis, rotational = driven.index, driven.rotational
     balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
     actuator = find_command_law(balance, driven, excluded, map_) if balance.tested else None
@@ -96,16 +97,17 @@ def find_balance(
         driven_channel = balance.search.regression.base_terms.driven_channel
         passed_motions = [_pass_through_law(motion, axis, driven_channel, actuator.law) for motion in motions]
         second_balance = judge_laws(search_with_linear_part(passed_motions, axis, rotational, excluded, time_left))
-        return replace(second_balance, laws=(judged_law, *second_balance.laws), linear_error=balance.linear_error)
+        if driven.target is not None or halves_one_body_error(balance, second_balance):
+            return replace(second_balance, laws=(judged_law, *second_balance.laws), linear_error=balance.linear_error)
+        judged_law = replace(judged_law, objection=ONE_BODY_REASON)
     if judged_law.gain_low <= 0 or judged_law.gain < FURTHER_LAW_SHARE:
         return balance
     if judged_law.gain < COMMAND_LAW_GAIN and not actuator.replaces_motion_laws:
         judged_motion_laws = tuple(_withdraw_if_curved(law, actuator) for law in balance.laws)
         further_laws = tuple(sorted((*balance.further_laws, judged_law), key=lambda item: -item.gain))
         return replace(balance, laws=judged_motion_laws, further_laws=further_laws)
-    motion_laws = balance.laws
-    if actuator.needs_no_motion_law:
-        motion_laws = tuple(replace(law, objection=law.objection or UNNECESSARY_REASON) for law in motion_laws)
+    reason = UNNECESSARY_REASON if actuator.needs_no_motion_law else ""
+    motion_laws = tuple(replace(law, objection=law.objection or reason) for law in balance.laws)
     return replace(balance, laws=(judged_law, *motion_laws))
 
 
@@ -146,9 +148,8 @@ def find_command_law(
     if not laws:
         return None
     best_laws = _refine_best_per_effect(inverse, laws, motion_laws)
-    law = min(best_laws, key=lambda candidate: candidate[0])[1]
+    law, *rivals = (candidate_law for _, candidate_law in sorted(best_laws, key=lambda candidate: candidate[0]))
     error_alone, error_with_laws = (inverse.sum_errors(law, law_sum) for law_sum in ((), motion_laws))
-    rivals = [rival_law for _, rival_law in best_laws if rival_law is not law]
     law = _scale_to_command(law, search.regression)
     judged_law = _judge_law(inverse, law, rivals, (motion_laws, motion_laws))
     is_as_small = error_alone <= error_with_laws / (1 - COMMAND_RIVAL_MARGIN)
@@ -204,8 +205,7 @@ def _replace_motion_laws(inverse: InverseBalance, kinds: LawKinds, named_laws: t
     if not laws:
         return None
     best_laws = _refine_best_per_effect(inverse, laws, ())
-    law = min(best_laws, key=lambda candidate: candidate[0])[1]
-    rivals = [rival_law for _, rival_law in best_laws if rival_law is not law]
+    law, *rivals = (candidate_law for _, candidate_law in sorted(best_laws, key=lambda candidate: candidate[0]))
     law = _scale_to_command(law, inverse.search.regression)
     judged_law = _judge_law(inverse, law, rivals, (named_laws, ()))
     explains_more = judged_law.gain >= COMMAND_LAW_GAIN or len(named_laws) > 1

@@ -17,15 +17,17 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.balance.regression import Regression, compute_signal_power
 from analysis.diagnosis.balance.structures import SLIDING, Structure, improves_significantly
-from analysis.diagnosis.limits import MOVING_TIME_SHARE, STILL_SHARE
+from analysis.diagnosis.limits import COMMAND_LAW_GAIN, MOVING_TIME_SHARE, STILL_SHARE
 
 DEAD_BAND_EFFECT = "force_deadband"
 """Name of the actuator's dead band in the catalogue of effects."""
 EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND_EFFECT: "coulomb_friction"}
 """For each law, the effect with the same motion where inertia is negligible; for the dead band, also where the axis
 rests in it."""
+ONE_BODY_REASON = "with one body, and no mode or relaxation beside it, it explains less than half of the error"
+"""Objection to a law of the command."""
 NO_REVERSAL_REASON = "the motion never changes direction"
 """Reason, in a message, why a law cannot be distinguished from its equivalent."""
 
@@ -117,3 +119,18 @@ def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
     return mass * regression.motions[0].rate_hz > max(damping, 0.0) and improves_significantly(
         massless_structure, structure_with_mass
     )
+
+
+def halves_one_body_error(balance: Balance, balance_with_law: Balance) -> bool:
+    """Whether a law of the command lowers the error of one body by `COMMAND_LAW_GAIN`: without modes and relaxations,
+    which a simulation of such a law cannot have. balance_with_law: of the force that the law gives."""
+    return _compute_one_body_error(balance_with_law) <= (1 - COMMAND_LAW_GAIN) * _compute_one_body_error(balance)
+
+
+def _compute_one_body_error(balance: Balance) -> float:
+    """Compute the share of the force's power, cross-validated, that one body with the chosen laws of the motion
+    leaves."""
+    regression = balance.search.regression
+    laws = [index for index in balance.chosen.laws if not regression.laws[index].is_linear]
+    errors = regression.cross_validate(regression.select_one_body_columns(laws))
+    return float(errors.sum()) / max(compute_signal_power(regression.fit), 1e-300)

@@ -20,6 +20,7 @@ from analysis.diagnosis.balance.motion import (
     compute_motions,
     find_motion_signals,
 )
+from analysis.diagnosis.data.measured_motion import is_free_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.readings_at_limit import stays_at_limit
@@ -31,6 +32,9 @@ from equalizer.signals.recording import Recording
 
 ACTUATOR_LAWS = frozenset({"amplifier_lag"})
 """Laws of the motion that an actuator causes: left out where the motion was imposed or free, so that none acts."""
+FREE_HARMONIC = 3.0
+"""Highest harmonic of a free motion in the band in which the device moves: a free motion is nearly a single line, and
+the third harmonic is the first in which the force of an odd law, such as a weight, differs from a spring's."""
 
 
 def find_balances(
@@ -97,9 +101,11 @@ def balance_selected_motions(
 
 def restrict_to_motion_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
     """Filter the motions to the band of the driven motions; empty where that band is hardly narrower. A further
-    measured motion, such as the deflection of a beam, may be mere noise at high frequencies. Raises NoMotionError where
-    a record contains no motion."""
-    narrow_hz = compute_motion_band_hz(motions, find_driven_channels(motions))
+    measured motion, such as the deflection of a beam, may be mere noise at high frequencies. The band of a free motion
+    reaches to `FREE_HARMONIC` times its highest frequency: no command has power there. Raises NoMotionError where a
+    record contains no motion."""
+    harmonic = FREE_HARMONIC if is_free_motion(records[0].recording) else 1.0
+    narrow_hz = harmonic * compute_motion_band_hz(motions, find_driven_channels(motions))
     return compute_motions(records, narrow_hz) if narrow_hz < SECOND_BAND_SHARE * motions[0].band_hz else ()
 
 

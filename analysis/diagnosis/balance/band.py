@@ -16,8 +16,12 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import estimate_spectral_density
 
 LEAST_BAND_BEGIN_CYCLES = 4.0
-"""Least lower end of the band, in cycles of the shortest recording: an integral over a finite recording is wrong at
-lower frequencies. Chosen."""
+"""Least lower end of the band, in cycles of the shortest recording that counts: an integral over a finite recording is
+wrong at lower frequencies. Chosen."""
+LEAST_LENGTH_SHARE = 0.1
+"""Least length of a recording that counts, relative to the length such that recordings at least as long hold half of
+all samples. Chosen. A shorter one, with fewer than `LEAST_BAND_BEGIN_CYCLES` cycles of the band's lower end, has no
+valid sample (`Motion.mask_valid_samples`)."""
 MOST_SEGMENT_SAMPLES = 4096
 """Largest number of samples in a segment from which the spectral density is estimated. Chosen."""
 
@@ -25,10 +29,11 @@ MOST_SEGMENT_SAMPLES = 4096
 def compute_band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
     """Compute the upper end of the band in Hz: median over the recordings' channels that have usable lines, at least
     `LEAST_BAND_END_CYCLES` cycles in the longest recording, at most `HIGHEST_BAND_END_RATIO` of the sample rate.
-    samples: (n, d) each. order: time derivative of the position that was measured (0, 1 or 2)."""
+    Recordings far shorter than most do not count (`LEAST_LENGTH_SHARE`). samples: (n, d) each. order: time derivative
+    of the position that was measured (0, 1 or 2)."""
     usable_lines_hz = [
         _find_usable_lines_hz(column - np.linspace(column[0], column[-1], len(column)), rate_hz, 2 * (2 - order))
-        for column in _list_varying_columns(samples)
+        for column in _list_counted_columns(samples)
     ]
     upper_ends_hz = [lines_hz[-1] for lines_hz in usable_lines_hz if len(lines_hz)] or [rate_hz / MOST_SEGMENT_SAMPLES]
     longest_samples = max(len(recording_samples) for recording_samples in samples)
@@ -43,17 +48,22 @@ def compute_band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: in
 
 def compute_band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
     """Compute the lower end in Hz of the band in which accelerations are integrated twice: median over the recordings'
-    channels that have usable lines, at least `LEAST_BAND_BEGIN_CYCLES`. samples: accelerations (n, d) each."""
-    usable_lines_hz = [_find_usable_lines_hz(column, rate_hz, -4) for column in _list_varying_columns(samples)]
+    channels that have usable lines, at least `LEAST_BAND_BEGIN_CYCLES`. Recordings far shorter than most do not
+    count. samples: accelerations (n, d) each."""
+    columns = _list_counted_columns(samples)
+    usable_lines_hz = [_find_usable_lines_hz(column, rate_hz, -4) for column in columns]
     lower_ends_hz = [lines_hz[0] for lines_hz in usable_lines_hz if len(lines_hz)] or [rate_hz / MOST_SEGMENT_SAMPLES]
-    shortest_samples = min(len(recording_samples) for recording_samples in samples)
+    shortest_samples = min(map(len, columns or samples))
     return max(float(np.median(lower_ends_hz)), LEAST_BAND_BEGIN_CYCLES * rate_hz / shortest_samples)
 
 
-def _list_varying_columns(samples: Sequence[FloatArray]) -> list[FloatArray]:
-    """List the channels (n,) of each recording that vary: a constant reading, as of an axis at rest, has no noise to
-    measure."""
-    return [column for recording_samples in samples for column in recording_samples.T if np.ptp(column) > 0]
+def _list_counted_columns(samples: Sequence[FloatArray]) -> list[FloatArray]:
+    """List the channels (n,) of each recording that count: those that vary, because a constant reading, as of an axis
+    at rest, has no noise to measure, and that are not far shorter than most (`LEAST_LENGTH_SHARE`)."""
+    columns = [column for recording_samples in samples for column in recording_samples.T if np.ptp(column) > 0]
+    lengths = np.sort([len(column) for column in columns])[::-1]
+    usual_length = lengths[np.searchsorted(np.cumsum(lengths), lengths.sum() / 2)] if columns else 0
+    return [column for column in columns if len(column) >= LEAST_LENGTH_SHARE * usual_length]
 
 
 def _find_usable_lines_hz(column: FloatArray, rate_hz: float, exponent: int) -> FloatArray:

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
-from analysis.diagnosis.balance.band import compute_band_begin_hz, compute_band_end_hz
+from analysis.diagnosis.balance.band import LEAST_BAND_BEGIN_CYCLES, compute_band_begin_hz, compute_band_end_hz
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.limits import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, MOVING_BAND_SHARE
@@ -87,10 +87,12 @@ class Motion:
 
     def mask_valid_samples(self, mask: Mask) -> Mask:
         """Mask (kept samples,) of the samples in a mask (n,), without `MOTION_EDGE_PERIODS` periods of the band's lower
-        end, or of its upper end where there is no lower one, but at least one sample, at either end of the part."""
+        end, or of its upper end where there is no lower one, but at least one sample, at either end of the part. None
+        where the part has fewer than `LEAST_BAND_BEGIN_CYCLES` periods of the lower end."""
         edge_samples = int(MOTION_EDGE_PERIODS * self.rate_hz / (self.lowest_hz or self.band_hz)) + 1
         interior = np.zeros(len(mask), dtype=np.bool_)
-        interior[edge_samples : len(mask) - edge_samples] = True
+        if round(len(mask) * self.lowest_hz / self.rate_hz, 6) >= LEAST_BAND_BEGIN_CYCLES or self.lowest_hz == 0:
+            interior[edge_samples : len(mask) - edge_samples] = True
         return (mask & interior)[:: self.step]
 
 

@@ -78,6 +78,14 @@ class Regression:
         ]
         return [*range(self.base_column_count), *law_columns]
 
+    def select_one_body_columns(self, law_indices: Sequence[int]) -> list[int]:
+        """Select as `select_columns`, without the modes and relaxations of the base."""
+        return [
+            k
+            for k in self.select_columns(law_indices)
+            if not self.matrix_column_count <= k < self.base_column_count - 1
+        ]
+
     def fit_weights(self, columns: Sequence[int]) -> FloatArray:
         """Fit weights (len(columns),) to all fit blocks, in the columns' own units."""
         return np.asarray(self._solve_nonnegative(sum_products(self.fit, columns)) / self.scale[list(columns)])
@@ -98,6 +106,27 @@ class Regression:
             stack_products(self.test, columns),
             self._solve_nonnegative(sum_products(self.fit, columns)),
         )
+
+    def fit_weight_by_motion(self, columns: Sequence[int], column: int) -> tuple[FloatArray, FloatArray]:
+        """Fit one of these columns with a weight for each motion, and the others with common weights. Returns the
+        weights (motions,) in the column's own unit, and the residual sum of squares of each test block (blocks,)."""
+        common_columns = [k for k in columns if k != column]
+        size = len(common_columns) + len(self.motions)
+
+        def separate_products(blocks: Sequence[Block]) -> tuple[FloatArray, FloatArray]:
+            """Stack the products as `stack_products`, with the column at the place of its motion: (blocks, size, size)
+            and (blocks, size)."""
+            gram, cross = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
+            products = zip(*stack_products(blocks, [*common_columns, column]), strict=True)
+            for block_index, (block, (block_gram, block_cross)) in enumerate(zip(blocks, products, strict=True)):
+                places = [*range(len(common_columns)), len(common_columns) + block.motion_index]
+                gram[block_index][np.ix_(places, places)], cross[block_index, places] = block_gram, block_cross
+            return gram, cross
+
+        gram, cross = separate_products(self.fit)
+        weights = solve_normal_equations(add_prior((gram.sum(axis=0), cross.sum(axis=0)), self.prior), RIDGE)
+        errors = compute_squared_errors(self.test, separate_products(self.test), weights)
+        return weights[len(common_columns) :] / self.scale[column], errors
 
     def _solve_nonnegative(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Solve for weights (..., c) from products (..., c, c) and (..., c): least squares in which mass and damping of

@@ -33,8 +33,13 @@ from equalizer.signals.signal import FloatArray
 
 STEP_FACTORS = (0.8, 0.93, 1.075, 1.25)
 """Factors on a nonlinear parameter in one pass of a coordinate search; chosen by hand."""
+STEP_SHARES = {"cogging": (0.05,), "end_stop": (1.0, 0.2), "contact_beyond_position": (1.0, 0.2)}
+"""By law, the shares of these steps in the passes, first coarse and then fine; for other laws 1. Chosen by hand: over a
+travel of many pitches, the phase of cogging turns by a multiple of a pitch's relative change; a contact that is off by
+a step leaves a force that a further law seems to explain."""
 MOST_PASSES = 6
-"""Largest number of passes of the coordinate search over the nonlinear parameters of one law; chosen by hand."""
+"""Largest number of passes of each kind in the coordinate search over the nonlinear parameters of one law; chosen by
+hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,25 +227,24 @@ def _refine_law(regression: Regression, index_in_sum: int) -> Law:
     """Refine one law of a structure by steps to its best neighbour. regression: with the structure's laws alone."""
     laws = tuple(range(len(regression.laws)))
     least_error = float(regression.cross_validate(regression.select_columns(laws)).sum())
-    for _ in range(MOST_PASSES):
-        trials = []
-        for neighbour in _list_neighbours(regression.laws[index_in_sum]):
-            trial = try_law(regression, index_in_sum, neighbour)
-            if trial is not None and _is_physical(trial, laws):
-                trials.append((float(trial.cross_validate(trial.select_columns(laws)).sum()), trial))
-        if not trials or min(trials, key=lambda pair: pair[0])[0] >= least_error * (1 - 1e-4):  # converged
-            break
-        least_error, regression = min(trials, key=lambda pair: pair[0])
+    for step_share in STEP_SHARES.get(regression.laws[index_in_sum].effect, (1.0,)):
+        for _ in range(MOST_PASSES):
+            trials = []
+            for neighbour in _list_neighbours(regression.laws[index_in_sum], step_share):
+                trial = try_law(regression, index_in_sum, neighbour)
+                if trial is not None and _is_physical(trial, laws):
+                    trials.append((float(trial.cross_validate(trial.select_columns(laws)).sum()), trial))
+            if not trials or min(trials, key=lambda pair: pair[0])[0] >= least_error * (1 - 1e-4):  # converged
+                break
+            least_error, regression = min(trials, key=lambda pair: pair[0])
     return regression.laws[index_in_sum]
 
 
-def _list_neighbours(law: Law) -> Iterator[Law]:
-    """List the law with each nonlinear parameter moved by each factor, within its bounds."""
+def _list_neighbours(law: Law, step_share: float) -> Iterator[Law]:
+    """List the law with each nonlinear parameter moved by this share of each factor's step, within its bounds."""
     for index, (low, high) in enumerate(law.bounds):
-        # Over a travel of many pitches, the phase of cogging turns by a multiple of a pitch's relative change.
-        step_scale = 0.05 if law.effect == "cogging" else 1.0
         for factor in STEP_FACTORS:
-            value = law.numbers[index] * (1 + (factor - 1) * step_scale)
+            value = law.numbers[index] * (1 + (factor - 1) * step_share)
             if low <= value <= high:
                 numbers = (*law.numbers[:index], float(value), *law.numbers[index + 1 :])
                 yield replace(law, numbers=numbers)

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judge_laws import Balance, judge_structure
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.laws.law import Formula
-from analysis.diagnosis.balance.structures import fit_values
+from analysis.diagnosis.balance.structures import Structure, fit_values
 from analysis.diagnosis.confirm.require_gain import CONSTANT_FORCE
 from analysis.diagnosis.errors.hypothesis import (
     NO_EFFECTS,
@@ -125,6 +125,49 @@ def find_special_case(
         if refining_effect is not None and is_unnamed and law.effect in refining_effect.simpler:
             return axis, replace(judged_law, law_index=law_index, law=law)
     return None
+
+
+def judge_special_cases(balances: Sequence[Balance], claims: Sequence[Claim]) -> tuple[Balance, ...]:
+    """Judge the balances again with the special cases that simulations preferred to laws of theirs, so that gains and
+    shares are those of the named effects; other balances are unchanged. The rivals are those of the replaced laws,
+    which were named for being distinguished from all others. claims: the named effects."""
+    return tuple(
+        _judge_special_cases_of_axis(balances, axis, {claim.effect.name for claim in claims if axis in claim.sites})
+        for axis in range(len(balances))
+    )
+
+
+def _judge_special_cases_of_axis(balances: Sequence[Balance], axis: int, named_effects: set[str]) -> Balance:
+    """Judge one balance again, as `judge_special_cases`. named_effects: names of the effects on this axis."""
+    balance, special_indices, rivals = balances[axis], {}, {}
+    for judged_law in balance.laws:
+        special_case = find_special_case(balances, [(axis, law) for law in balance.laws], (axis, judged_law))
+        is_replaced = judged_law.has_column and judged_law.simulated_as not in named_effects
+        if is_replaced and special_case is not None and special_case[1].law.effect in named_effects:
+            special_indices[judged_law.law_index] = special_case[1].law_index
+            rivals[special_case[1].law_index] = judged_law
+    if not special_indices:
+        return balance
+    regression = balance.search.regression
+    indices = tuple(special_indices.get(index, index) for index in balance.chosen.laws)
+    chosen = Structure(indices, regression.cross_validate(regression.select_columns(indices)))
+    judged = judge_structure(balance.search, chosen)
+    command_laws = tuple(law for law in balance.laws if not law.has_column)
+    laws = tuple(_take_rivals(law, rivals.get(law.law_index)) for law in judged.laws)
+    return replace(judged, laws=(*command_laws, *laws))
+
+
+def _take_rivals(special_case: JudgedLaw, replaced_law: JudgedLaw | None) -> JudgedLaw:
+    """Give a special case the rivals and the probability of the law that it replaced, which becomes a rival itself;
+    unchanged without one."""
+    if replaced_law is None:
+        return special_case
+    rivals = (replaced_law.law.effect, *replaced_law.equivalents)
+    return replace(
+        special_case,
+        equivalents=tuple(effect for effect in rivals if effect != special_case.law.effect),
+        probability=replaced_law.probability,
+    )
 
 
 def estimate_constant_forces(balances: Sequence[Balance]) -> Hypothesis:

@@ -29,6 +29,7 @@ from analysis.diagnosis.first_model.model_structures import (
 from analysis.diagnosis.limits import MODES_GAIN, REPORTED_REMAINDER_SHARE, RICHER_STRUCTURE_GAIN
 from equalizer.identification.mechanical.mechanical_free_simulation import compute_simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
+from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summary, SummaryDisplay
@@ -117,9 +118,10 @@ def choose_structure(
         "From the fewest parameters on, a structure with more was preferred where it lowers the cross-validated error "
         f"power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %); the choice is {best.kind}."
     )
-    return _compare_with_two_modes(
-        ChosenStructure(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress
-    )
+    choice = ChosenStructure(best, trials, reason, describe_remaining_error(balanced, best))
+    if balanced.untimed or balanced.free or balanced.turns_freely:
+        return choice
+    return _compare_with_spectra(choice, recordings, on_progress)
 
 
 def _fit_requested(
@@ -208,21 +210,44 @@ def _fit_structures(
     return structure_fits, tuple(trials)
 
 
-def _compare_with_two_modes(
+def _compare_with_spectra(
     choice: ChosenStructure, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> ChosenStructure:
-    """Compare a chosen mass-spring with a structure of two modes, which is chosen instead where its error in a free
-    simulation of held-out samples (of the fitted ones where none are) is smaller by more than `MODES_GAIN`. Other
-    choices are returned unchanged."""
-    if choice.fit.kind != "mass-spring":
-        return choice
+    """Compare a structure chosen by force balance with one of two modes (without a mode that lowers the error: with
+    mass, damper and spring) fitted to spectra, which noise of a differentiated position does not bias. It is chosen
+    where its error in a free simulation of held-out samples (of the fitted ones where none are) is smaller by more than
+    `MODES_GAIN`."""
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
         reason = "it is fitted to spectra, which a controller or an imposed motion biases"
         return _append_trial(choice, TriedStructure("two-mode", None, reason))
-    try:
-        modal_fit = fit_modal_structure(recordings, "two-mode", on_progress)
-    except StructureFitError as refusal:
-        return _append_trial(choice, TriedStructure("two-mode", None, str(refusal)))
+    kinds: tuple[Kind, ...] = ("two-mode",) if choice.fit.kind == "mass-spring" else ("two-mode", "mass-spring")
+    for kind in kinds:
+        try:
+            modal_fit = fit_modal_structure(recordings, kind, on_progress)
+            break
+        except StructureFitError as refusal:
+            choice = _append_trial(choice, TriedStructure(kind, None, str(refusal)))
+    else:
+        return choice
+    errors = _compute_simulation_errors((choice.fit.model, modal_fit.model), recordings)
+    if errors is None:
+        return _append_trial(choice, TriedStructure(kind, modal_fit.error, "no segment to test by is excited"))
+    comparison = (
+        f"In a free simulation the error of {choice.fit.kind} is {100 * errors[0]:.3g} %, that of {kind} fitted to "
+        f"spectra {100 * errors[1]:.3g} %."
+    )
+    if errors[1] < (1 - MODES_GAIN) * errors[0]:
+        trials = (*choice.tried, TriedStructure(kind, modal_fit.error, ""))
+        return ChosenStructure(modal_fit, trials, comparison, describe_remaining_error(None, modal_fit))
+    refused = TriedStructure(kind, modal_fit.error, "the fit to spectra lowers the error too little")
+    return _append_trial(choice, refused, comparison)
+
+
+def _compute_simulation_errors(
+    models: Sequence[MechanicalModel], recordings: Sequence[Recording]
+) -> tuple[float, ...] | None:
+    """Compute each model's error in a free simulation of the samples kept for a test, or of those to fit where none
+    are; None where no segment is excited."""
     fit_recordings, test_recordings = split_fit_and_test(recordings)
     segment_lines = [
         lines
@@ -230,26 +255,14 @@ def _compare_with_two_modes(
         if (lines := compute_segment_lines(*recording_part)) is not None
     ]
     if not segment_lines:
-        return _append_trial(choice, TriedStructure("two-mode", modal_fit.error, "no segment to test by is excited"))
-    band_edges_hz = [
+        return None
+    edges_hz = [
         float(select_bound(lines_of_segment.frequency_hz[lines_of_segment.excited]))
         for lines_of_segment in segment_lines
         for select_bound in (np.min, np.max)
     ]
-    simulation_errors = [
-        float(compute_simulation_errors(model, segment_lines, (min(band_edges_hz), max(band_edges_hz)))[0][-1])
-        for model in (choice.fit.model, modal_fit.model)
-    ]
-    comparison = (
-        f"In a free simulation the error of mass-spring is {100 * simulation_errors[0]:.3g} %, that of two-mode "
-        f"{100 * simulation_errors[1]:.3g} %."
-    )
-    if simulation_errors[1] < (1 - MODES_GAIN) * simulation_errors[0]:
-        trials = (*choice.tried, TriedStructure("two-mode", modal_fit.error, ""))
-        return ChosenStructure(modal_fit, trials, comparison, describe_remaining_error(None, modal_fit))
-    return _append_trial(
-        choice, TriedStructure("two-mode", modal_fit.error, "modes lower the error too little"), comparison
-    )
+    band_hz = (min(edges_hz), max(edges_hz))
+    return tuple(float(compute_simulation_errors(model, segment_lines, band_hz)[0][-1]) for model in models)
 
 
 def _append_trial(choice: ChosenStructure, trial: TriedStructure, sentence: str = "") -> ChosenStructure:

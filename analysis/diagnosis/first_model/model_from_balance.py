@@ -33,12 +33,9 @@ def build_first_model(balances: Sequence[Balance], recording: Recording, name: s
     if command_count > len(regressions[0].motions[0].channels) or command_count != len(recording.response.channels):
         return None
     driven_channels = [regression.base_terms.driven_channel for regression in regressions]
+    named_laws = [tuple(law.law_index for law in balance.named if law.law_index >= 0) for balance in balances]
     rows_without_laws, rows_with_laws = (
-        [_fit_matrix_rows(balance, indices, driven_channels) for balance, indices in zip(balances, laws, strict=True)]
-        for laws in (
-            [()] * command_count,
-            [tuple(law.law_index for law in balance.named if law.law_index >= 0) for balance in balances],
-        )
+        _fit_matrix_rows(balances, laws, driven_channels) for laws in ([()] * command_count, named_laws)
     )
     matrices = [np.array([rows[matrix_index] for rows in rows_without_laws]) for matrix_index in range(3)]
     matrices_with_laws = [np.array([rows[matrix_index] for rows in rows_with_laws]) for matrix_index in range(3)]
@@ -127,16 +124,21 @@ def _compute_power_share(forces: Sequence[FloatArray], motions: Sequence[Motion]
 
 
 def _fit_matrix_rows(
-    balance: Balance, law_indices: Sequence[int], driven_channels: Sequence[int]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit one row of the mass, damping and stiffness matrix each, (commands,), to one balance with these laws.
-    law_indices: of the laws; driven_channels: channels of the driven motions. A stiffness row that the balance does not
-    contain is zero."""
-    regression = balance.search.regression
-    weights = regression.fit_weights(regression.select_columns(law_indices))[: regression.matrix_column_count]
-    channel_count = len(regression.motions[0].channels)
-    rows = [*weights.reshape(-1, channel_count)[:, list(driven_channels)], np.zeros(len(driven_channels))]
-    return rows[0], rows[1], rows[2]
+    balances: Sequence[Balance], laws: Sequence[Sequence[int]], driven_channels: Sequence[int]
+) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Fit one row of the mass, damping and stiffness matrix, (commands,) each, to each balance with its laws. laws:
+    their indices, per balance; driven_channels: channels of the driven motions. Unless the commands are reduced by the
+    forces of modes and relaxations, these are left out of the fit, as of the model. A stiffness row that a balance does
+    not contain is zero."""
+    is_reduced, fitted_rows = is_reduction_needed(balances), []
+    for balance, law_indices in zip(balances, laws, strict=True):
+        regression = balance.search.regression
+        select = regression.select_columns if is_reduced else regression.select_one_body_columns
+        weights = regression.fit_weights(select(law_indices))[: regression.matrix_column_count]
+        channel_count = len(regression.motions[0].channels)
+        rows = [*weights.reshape(-1, channel_count)[:, list(driven_channels)], np.zeros(len(driven_channels))]
+        fitted_rows.append((rows[0], rows[1], rows[2]))
+    return fitted_rows
 
 
 def _compute_rms(samples: FloatArray) -> FloatArray:

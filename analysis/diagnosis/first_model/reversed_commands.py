@@ -4,9 +4,10 @@ or amplifier.
 A passive device has no negative mass and no negative damping. The force of each axis, F = m a + d v + k x, is therefore
 balanced twice, with the recorded and with the negated command, each time with m >= 0 and d >= 0. The sign is reversed
 where that lowers the cross-validated error by more than `REVERSED_SIGN_GAIN` and significantly
-(`improves_significantly`). A spring alone does not determine the sign, because k may be positive or negative. The
-reversed commands are listed in the recording's `meta`, so that a model is written for the commands as recorded
-(`recorded_conditions`).
+(`improves_significantly`), and leaves at most half of the force's power: with more, as against a rigid wall, mass and
+damping may only stand for other physics, and their signs mean nothing. A spring alone does not determine the sign,
+because k may be positive or negative. The reversed commands are listed in the recording's `meta`, so that a model is
+written for the commands as recorded (`recorded_conditions`).
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
-from analysis.diagnosis.balance.regression import build_regression
+from analysis.diagnosis.balance.regression import build_regression, compute_signal_power
 from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, is_free_motion
 from analysis.diagnosis.data.observed_parts import observe_parts
@@ -24,6 +25,10 @@ from analysis.diagnosis.limits import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
+
+LARGEST_ERROR_SHARE = 0.5
+"""Largest share of the force's power that mass, damping and stiffness leave where a sign is reversed. Chosen as in
+`confirm.held_out_gain.explains_half`: with more, they may only be a substitute."""
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
@@ -73,9 +78,11 @@ def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
         Structure((), regression.cross_validate(regression.select_columns(())))
         for regression in (recorded_regression, negated_regression)
     )
-    return negated_structure.error < (1 - REVERSED_SIGN_GAIN) * recorded_structure.error and improves_significantly(
-        recorded_structure, negated_structure
+    largest_error = min(
+        (1 - REVERSED_SIGN_GAIN) * recorded_structure.error,
+        LARGEST_ERROR_SHARE * compute_signal_power(negated_regression.fit),
     )
+    return negated_structure.error < largest_error and improves_significantly(recorded_structure, negated_structure)
 
 
 def _multiply_forces(recording: Recording, is_motion_imposed: bool, signs: FloatArray) -> Recording:

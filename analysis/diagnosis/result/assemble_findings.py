@@ -4,6 +4,7 @@ In this order: labels and re-tuned models, standard errors, mismatch maps of the
 examination of the fits (`examine_fits`), choice of the next recording, document.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -23,7 +24,12 @@ from analysis.diagnosis.localisation.mismatch_maps import MismatchMaps, build_mi
 from analysis.diagnosis.localisation.mismatch_rows import list_mismatch_rows
 from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor, describe_model_error_floor
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.result.error_table import collect_channel_errors, compute_fit_errors, is_held_out_still
+from analysis.diagnosis.result.error_table import (
+    collect_channel_errors,
+    compute_fit_errors,
+    find_resting_channels,
+    is_held_out_still,
+)
 from analysis.diagnosis.result.examine_fits import examine_fits
 from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.named_effects import Labels, make_labels, make_named_effects
@@ -33,6 +39,7 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import compute_final_errors, compute_interval_errors
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
+from analysis.wording import conjoin
 from equalizer.effects.placing import convert_to_model_effects, shorten_axis_name
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -59,7 +66,11 @@ def assemble_findings(
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
     unit_doubts = describe_measured_doubts(measure, tuning.model, floors, time_series)
-    measure_remarks = (_describe_held_out_rest(measure), describe_model_error_floor(learned, channels), in_samples)
+    measure_remarks = (
+        _describe_held_out_rest(measure, channels),
+        describe_model_error_floor(learned, channels),
+        in_samples,
+    )
     return Findings(
         diagnosis=_build_document(result, errors, (maps, examination.localisation), proposal),
         explanation=fits,
@@ -101,21 +112,34 @@ def _build_models(result: SearchResult, recording: Recording) -> tuple[Mechanica
     )
 
 
-def _describe_held_out_rest(measure: ErrorMeasure) -> str:
-    """Describe in a sentence that the held-out samples contain no motion; empty where they do."""
-    if not is_held_out_still(measure.records, measure.noise):
+def _describe_held_out_rest(measure: ErrorMeasure, channels: Sequence[str]) -> str:
+    """Describe in a sentence that the held-out samples contain no motion, or none of some channels; empty where all
+    move. channels: names."""
+    if is_held_out_still(measure.records, measure.noise):
+        return (
+            "The held-out data contain no motion, so no error on them is stated. Give a stretch with motion the role "
+            "of a test."
+        )
+    is_resting = find_resting_channels(measure.records, measure.noise)
+    if not is_resting.any():
         return ""
+    resting_names = conjoin([name for name, rests in zip(channels, is_resting, strict=True) if rests])
     return (
-        "The held-out data contain no motion, so no error on them is stated. Give a stretch with motion the role of "
-        "a test."
+        f"The held-out data contain no motion of {resting_names}, so the error on them is that of the other channels. "
+        "Give a stretch in which all move the role of a test."
     )
 
 
 def _collect_remarks(
     first_remarks: Sequence[Sequence[str]], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
-    """Collect remarks without repetition: first_remarks, then on unknown units, and on the noise."""
-    noise_remarks = (remark for floor in floors for remark in floor.remarks)
+    """Collect remarks without repetition: first_remarks, then on unknown units, and on the noise. A remark that does
+    not hold for all floors (one per recording or part) begins with their number, for others may say the contrary."""
+    floor_counts = Counter(remark for floor in floors for remark in dict.fromkeys(floor.remarks))
+    noise_remarks = (
+        remark if floor_count == len(floors) else f"In {floor_count} of {len(floors)} recordings or parts: {remark}"
+        for remark, floor_count in floor_counts.items()
+    )
     remarks = (
         *(remark for group in first_remarks for remark in group),
         describe_unknown_units(tuning.model),
@@ -210,6 +234,14 @@ def list_channel_names(recording: Recording, channel_count: int) -> tuple[str, .
     """List the names of the response's channels, then of the position's, at most channel_count."""
     position = () if recording.position is None else recording.position.channels
     return (*recording.response.channels, *position)[:channel_count]
+
+
+def list_reading_units(recording: Recording) -> dict[str | None, str]:
+    """List the units of the response channels: `Findings.reading_units`."""
+    channels, units = recording.response.channels, recording.response.units
+    names = (shorten_axis_name(channel, channels) for channel in channels)
+    reading_units: dict[str | None, str] = dict(zip(names, units, strict=True))
+    return reading_units | ({None: units[0]} if len(set(units)) == 1 else {})
 
 
 def _build_time_series(measure: ErrorMeasure, explanation: Explanation, names: Sequence[str]) -> tuple[TimeSeries, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import compute_signal_rms
+from analysis.diagnosis.result.error_table import find_resting_channels
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.types import Mask
@@ -142,8 +143,9 @@ def _select_terms(candidate_terms: FloatArray, target: FloatArray, term_count: i
 
 
 def _normalise_error(measure: ErrorMeasure, errors: FloatArray) -> float:
-    """Compute rms error over rms signal on the test samples, root mean square over channels. errors: (test samples, c),
-    in units of `measure.unit`."""
+    """Compute rms error over rms signal on the test samples, root mean square over the channels that move there, as in
+    `error_table`. errors: (test samples, c), in units of `measure.unit`."""
     signal_rms = np.maximum(compute_signal_rms(measure.records, [record.test for record in measure.records]), _TINY)
     relative_rms = np.sqrt(np.mean(errors**2, axis=0)) * measure.unit / signal_rms
-    return float(np.sqrt(np.mean(relative_rms**2)))
+    is_resting = find_resting_channels(measure.records, measure.noise)
+    return float(np.sqrt(np.mean(relative_rms[~is_resting] ** 2)))

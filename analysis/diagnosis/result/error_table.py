@@ -58,21 +58,24 @@ def _compute_log_errors(explanation: Explanation, statistic: Statistic, roles: t
 
 def _compute_errors(measure: ErrorMeasure, explanation: Explanation, roles: tuple[str, ...]) -> Errors:
     """Compute the errors on the samples of these roles, relative to the signal; None where there are no samples, an
-    error is not finite, or held-out samples contain no motion. The error by noise alone is also None where an error is
-    clearly smaller (`EQUAL_ERROR_RATIO`)."""
-    if roles == ("test",) and is_held_out_still(measure.records, measure.noise):
+    error is not finite, or held-out samples contain no motion. Channels that rest there alone are left out
+    (`find_resting_channels`). The error by noise alone is also None where an error is clearly smaller
+    (`EQUAL_ERROR_RATIO`)."""
+    is_test = roles == ("test",)
+    if is_test and is_held_out_still(measure.records, measure.noise):
         return Errors(None, None, None, None)
     masks = [np.logical_or.reduce([getattr(record, role) for role in roles]) for record in measure.records]
     if not any(mask.any() for mask in masks):
         return Errors(None, None, None, None)
     signal_rms = np.maximum(compute_signal_rms(measure.records, masks), np.finfo(float).tiny)
+    is_resting = find_resting_channels(measure.records, measure.noise) if is_test else np.zeros(len(signal_rms), bool)
 
     def compute_error(candidate: FittedCandidate) -> float | None:
         error_ratios = compute_residual_rms(candidate.fitted.residuals, masks) * measure.unit / signal_rms
-        mean_error = float(np.sqrt(np.mean(error_ratios**2)))
+        mean_error = float(np.sqrt(np.mean(error_ratios[~is_resting] ** 2)))
         return mean_error if np.isfinite(mean_error) else None
 
-    noise = float(np.sqrt(np.mean((measure.noise / signal_rms) ** 2)))
+    noise = float(np.sqrt(np.mean((measure.noise / signal_rms)[~is_resting] ** 2)))
     given_error, retuned_error, completed_error = (
         compute_error(stage) for stage in (explanation.before, explanation.retuned, explanation.after)
     )
@@ -87,13 +90,29 @@ def is_held_out_still(records: Sequence[Observed], noise: FloatArray) -> bool:
     """Whether samples are held out, and every channel's mean square in them is below `STILL_SHARE` of that in the other
     samples, or at its noise, although a channel moves above the noise in the others. Errors on such samples test
     nothing. noise: (c,), rms."""
+    moves, rests = _find_motion_and_rest(records, noise)
+    return bool(moves.any() and rests.all())
+
+
+def find_resting_channels(records: Sequence[Observed], noise: FloatArray) -> Mask:
+    """Find (c,): channels that rest in the held-out samples, as in `is_held_out_still`, and move in the others. Any
+    error is large relative to their signal there. noise: (c,), rms."""
+    moves, rests = _find_motion_and_rest(records, noise)
+    return moves & rests
+
+
+def _find_motion_and_rest(records: Sequence[Observed], noise: FloatArray) -> tuple[Mask, Mask]:
+    """Find (c,) each: whether a channel moves above the noise in the samples that are not held out, and whether it
+    rests in the held-out ones; none of both where nothing is held out. noise: (c,), rms."""
     if not any(record.test.any() for record in records):
-        return False
+        nothing = np.zeros(len(noise), dtype=np.bool_)
+        return nothing, nothing
     held_out_power = _compute_mean_power(records, [record.test for record in records])
     fitted_power = _compute_mean_power(records, [record.fit | record.choose for record in records])
     # A channel that contains only noise is never below a share of that in the fitted samples.
     still_power = np.fmax(STILL_SHARE * fitted_power, (HELD_OUT_MISMATCH_ERROR * noise) ** 2)
-    return bool((STILL_SHARE * fitted_power > noise**2).any() and (held_out_power <= still_power).all())
+    moves: Mask = np.asarray(STILL_SHARE * fitted_power > noise**2, dtype=np.bool_)
+    return moves, np.asarray(held_out_power <= still_power, dtype=np.bool_)
 
 
 def _compute_mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArray:

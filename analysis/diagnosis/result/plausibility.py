@@ -1,25 +1,34 @@
 """Check whether the results of a diagnosis are physically plausible, and write a sentence for the report per doubt.
 
 Doubts are: a parameter at the bound of its fit, static friction below Coulomb friction, a confidence interval that
-contains the value without the effect, and negative damping or stiffness of the improved model (not passive, or
-unstable).
+contains the value without the effect, negative damping or stiffness of the improved model (not passive, or unstable),
+and a law of the force balance whose strength differs between the parts of the recordings.
 """
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.unit_wording import format_value
+from analysis.diagnosis.unit_wording import format_error, format_value
+from analysis.wording import conjoin
 from equalizer.effects.effect import Parameter, PlacedEffect
+from equalizer.effects.placing import shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, RESPONSE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+    from analysis.diagnosis.balance.judged_law import JudgedLaw
+
 _BOUND_TOLERANCE = 1e-3
 """Relative distance from a bound within which a parameter counts as at that bound. Chosen."""
+_MOST_LISTED_PARTS = 8
+"""Largest number of parts whose values are listed; of more, the lowest and the highest. Chosen."""
 _EIGENVALUE_ROUNDING = 1e-6
 """Magnitude of a negative eigenvalue that rounding may cause, relative to the largest eigenvalue. Chosen."""
 
@@ -86,6 +95,52 @@ def _check_model(improved: MechanicalModel) -> Iterator[str]:
                 else "would move away from its position of rest without a force"
             )
             yield f"The improved model's {name} is negative in one direction: in it, the device {consequence}."
+
+
+def describe_changed_strengths(
+    effects: Sequence[NamedEffect], balances: "Sequence[Balance]", channels: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Describe, in a sentence each, named laws whose strength differs between the parts of the recordings. channels:
+    names of the commands, in the order of the balances."""
+    return tuple(
+        sentence
+        for channel, balance in zip(channels, balances, strict=False)
+        for judged_law in balance.named
+        for effect in effects
+        if effect.effect == judged_law.simulated_as and effect.axis in (shorten_axis_name(channel, channels), None, "")
+        for sentence in _compare_parts(effect, judged_law, balance)
+    )
+
+
+def _compare_parts(effect: NamedEffect, judged_law: "JudgedLaw", balance: "Balance") -> Iterator[str]:
+    """Compare the strengths of a law of one column, fitted to each part (motion) that has samples to fit and to test: a
+    sentence where separate values reduce the error of the held-out samples significantly."""
+    from analysis.diagnosis.balance.structures import Structure, improves_significantly
+
+    regression, laws = balance.search.regression, balance.chosen.laws
+    main_parameter = EFFECTS_BY_NAME[effect.effect].main.name if effect.effect in EFFECTS_BY_NAME else ""
+    parts = sorted({block.motion_index for block in regression.fit} & {block.motion_index for block in regression.test})
+    column_range = regression.column_ranges[judged_law.law_index] if judged_law.law_index in laws else slice(0)
+    if main_parameter not in effect.parameters or len(parts) < 2 or column_range.stop - column_range.start != 1:
+        return
+    columns = regression.select_columns(laws)
+    common_errors = regression.compute_test_errors(columns)
+    common_weight = float(regression.fit_weights(columns)[columns.index(column_range.start)])
+    weights, errors = regression.fit_weight_by_motion(columns, column_range.start)
+    if common_weight and improves_significantly(Structure(laws, common_errors), Structure(laws, errors)):
+        estimate = effect.parameters[main_parameter]
+        values = [estimate.value * float(weights[part]) / common_weight for part in parts]
+        ends = f"between {format_value(min(values), estimate.unit)} and {format_value(max(values), estimate.unit)}"
+        listed = conjoin([format_value(value, estimate.unit) for value in values])
+        power = sum(block.centred_power for block in regression.test)
+        before, after = (format_error(float(np.sqrt(e.sum() / power))) for e in (common_errors, errors))
+        name = f"{main_parameter.replace('_', ' ')} of {get_noun(effect.effect)}"
+        yield (
+            f"Fitted to each of the {len(parts)} parts alone, the {name} is "
+            f"{listed if len(parts) <= _MOST_LISTED_PARTS else ends}, and the error of the force balance falls from "
+            f"{before} to {after}: something that was not recorded changed between the parts, or the law depends on "
+            "the motion in another way."
+        )
 
 
 def _compute_extreme_eigenvalues(matrix: FloatArray) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.limits import EQUAL_ERROR_RATIO, RETUNING_DOUBTED, RETUNING_NAMED
-from analysis.diagnosis.unit_wording import format_error, format_value
+from analysis.diagnosis.unit_wording import format_error, format_error_of_signal, format_value
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
@@ -37,9 +37,8 @@ class MovedParameter:
     def change_text(self) -> str:
         """The change with its sign and unit; a relative change in per cent."""
         sign = "+" if self.change >= 0 else ""
-        change_size = (
-            f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else format_value(self.change, self.unit)
-        )
+        percent = float(f"{100 * self.change:.2g}")
+        change_size = f"{typeset(f'{percent:g}')} %" if self.unit == "1" else format_value(self.change, self.unit)
         return f"{sign}{change_size}"
 
 
@@ -139,6 +138,6 @@ def describe_raised_error(errors: Errors) -> str:
         return ""
     return (
         f"Re-tuning raises the error on held-out data from {format_error(errors.before)} to "
-        f"{format_error(errors.retuned)} of the signal: the fitted data differ from the held-out data, and the "
+        f"{format_error_of_signal(errors.retuned)}: the fitted data differ from the held-out data, and the "
         "re-tuned parameters are doubtful."
     )

@@ -29,6 +29,7 @@ from analysis.diagnosis.balance.laws.law import (
     NonlinearParameters,
     Scales,
     WeightConverter,
+    make_contact_columns,
     smooth_sign,
 )
 from analysis.diagnosis.balance.motion import Motion
@@ -154,16 +155,10 @@ def _make_contact_laws(c: int, scales: Scales) -> Iterator[Law]:
             (scales.high, 1.0, "-p0*maximum(q - p1, 0)"), (scales.low, -1.0, "p0*maximum(p1 - q, 0)")
         ):  # fmt: skip
             yield Law(
-                "contact_beyond_position", c, (depth,), _make_contact_columns(c, end, side),
+                "contact_beyond_position", c, (depth,), make_contact_columns(c, end, side),
                 _make_position_reader(end, -side), bounds=((0.01 * scales.travel, 0.8 * scales.travel),),
                 formula=_make_formula(text),
             )  # fmt: skip
-
-
-def _make_contact_columns(c: int, end: float, side: float) -> Columns:
-    """Make the function for the column (n, 1) of a contact towards `side` whose depth at the end of the travel is
-    n[0]."""
-    return lambda m, n: side * np.maximum(side * (m.position[:, [c]] - end) + n[0], 0.0)
 
 
 def _make_position_reader(end: float, side: float) -> WeightConverter:

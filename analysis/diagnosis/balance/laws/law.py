@@ -131,6 +131,13 @@ def smooth_sign(velocity: FloatArray, width: float) -> FloatArray:
     return np.asarray(np.tanh(velocity / width))
 
 
+def make_contact_columns(channel: int, end: float, side: float) -> Columns:
+    """Make the function for the column (samples, 1) of a contact towards `side` (+1 or -1), whose depth at the end of
+    the travel is n[0], m (rad): the penetration, with the sign of `side`. The depth is refined by factors, which would
+    change a position near zero too little and one far from it too much."""
+    return lambda motion, n: side * np.maximum(side * (motion.position[:, [channel]] - end) + n[0], 0.0)
+
+
 def name_weights(*names: str) -> WeightConverter:
     """Make a `WeightConverter` that gives the weights these names, in their order, with either sign."""
     return lambda w, n, mass: dict(zip(names, map(float, w), strict=True))

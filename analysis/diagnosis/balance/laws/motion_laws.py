@@ -15,13 +15,13 @@ import numpy as np
 
 from analysis.diagnosis.balance.laws.friction_laws import make_damping_laws, make_friction_laws
 from analysis.diagnosis.balance.laws.law import (
-    Columns,
     Law,
     NonlinearParameters,
     Scales,
     WeightConverter,
     compute_relative_time,
     filter_from_rest,
+    make_contact_columns,
     measure_scales,
     name_weights,
 )
@@ -150,14 +150,11 @@ def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
     yield Law(
         "asymmetric_stiffness", channel, (), lambda motion, _: motion.position[:, [channel]] ** 2, name_weights("k2")
     )
-    for distance_share in STOP_DISTANCES:
-        for stop_position, side in (
-            (scales.high - distance_share * scales.travel, 1.0),
-            (scales.low + distance_share * scales.travel, -1.0),
-        ):
+    for depth in (share * scales.travel for share in STOP_DISTANCES):
+        for end, side in ((scales.high, 1.0), (scales.low, -1.0)):
             yield Law(
-                "end_stop", channel, (float(stop_position),),
-                _make_stop_columns(channel, side), _make_stop_converter(side), bounds=((scales.low, scales.high),),
+                "end_stop", channel, (depth,), make_contact_columns(channel, end, side),
+                _make_stop_converter(end, side), bounds=((1e-3 * scales.travel, scales.travel),),
             )  # fmt: skip
     for half_gap in scales.travel * np.array(HALF_GAPS):
         # With an equal weight of the balance's spring term k x, it gives k (x - clip(x)): a spring beyond the gap only.
@@ -169,21 +166,17 @@ def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
         )  # fmt: skip
 
 
-def _make_stop_converter(side: float) -> WeightConverter:
-    """Make the function that converts the weight to the parameters of an end stop towards `side` (+1 or -1). They
-    include `side` only where the sign of the position does not imply it. None for a stiffness that is not positive."""
+def _make_stop_converter(end: float, side: float) -> WeightConverter:
+    """Make the function that converts the weight and the depth of the stop at an end of the travel to the parameters of
+    an end stop towards `side` (+1 or -1). They include `side` only where the sign of the position does not imply it.
+    None for a stiffness that is not positive."""
 
     def convert_weight(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
-        side_parameter = {} if side * n[0] > 0 else {"side": side}
-        return {"position": n[0], "stiffness": float(w[0]), "opposite": 0.0, **side_parameter} if w[0] > 0 else None
+        position = end - side * n[0]
+        side_parameter = {} if side * position > 0 else {"side": side}
+        return {"position": position, "stiffness": float(w[0]), "opposite": 0.0, **side_parameter} if w[0] > 0 else None
 
     return convert_weight
-
-
-def _make_stop_columns(channel: int, side: float) -> Columns:
-    """Make the column (samples, 1): penetration of the stop (m or rad), with the sign of `side`; zero before
-    contact."""
-    return lambda motion, n: side * np.maximum(side * (motion.position[:, [channel]] - n[0]), 0.0)
 
 
 def make_dynamic_laws(channel: int, scales: Scales) -> Iterator[Law]:
@@ -195,7 +188,9 @@ def make_dynamic_laws(channel: int, scales: Scales) -> Iterator[Law]:
             "pose_dependent_inertia", channel, (),
             lambda motion, _: motion.position[:, [channel]] * motion.acceleration[:, [channel]]
             + 0.5 * motion.velocity[:, [channel]] ** 2,
-            lambda w, n, mass: {"per_m": float(w[0] / mass), "speed_share": 0.5} if mass > 0 else None,
+            # An inertia is positive wherever the axis was.
+            lambda w, n, mass: {"per_m": float(w[0] / mass), "speed_share": 0.5}
+            if mass > 0 and mass + min(w[0] * scales.low, w[0] * scales.high) > 0 else None,
         )  # fmt: skip
     for damping_ratio in MODE_DAMPING_RATIOS:
         for frequency_hz in scales.band_hz * np.array(MODE_FREQUENCIES):

@@ -1,11 +1,14 @@
 """Nonlinear laws of the actuator are found where the balance is solved for the acceleration."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance import actuator_equivalents
+from analysis.diagnosis.balance import actuator, actuator_equivalents
+from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.laws.command_laws import IDEAL_ACTUATOR, vary_parameters
 
 
@@ -241,3 +244,37 @@ def test_laws_behind_a_dead_band_in_doubt_are_not_named(rubbing_dead_band, monke
     doubted = actuator_equivalents.withdraw_ambiguous_names(balance)
     assert set(laws_by_name(doubted)) == ({"force_deadband", "coulomb_friction"} if inertia else set())
     assert len(doubted.laws) == len(balance.laws)
+
+
+@pytest.mark.parametrize(
+    ("one_body_error", "target", "is_named"), [(0.19, None, True), (0.21, None, False), (0.21, 0, True)]
+)
+def test_a_law_of_the_command_is_named_only_if_it_halves_the_error_of_one_body(
+    monkeypatch, one_body_error, target, is_named
+):
+    """Else modes explain the same, and neither it nor the law of the motion that it makes unnecessary is named."""
+    base_terms = SimpleNamespace(laws=(), driven_channel=0)
+    search = SimpleNamespace(regression=SimpleNamespace(base_terms=base_terms))
+    rubbing, curved = (
+        JudgedLaw(place, SimpleNamespace(effect=effect, is_linear=False), {}, 0.9, 0.8, 0.9, (), 1.0, "")
+        for place, effect in ((4, "coulomb_friction"), (NO_COLUMN, "force_nonlinearity"))
+    )
+    balance = Balance(search, None, (rubbing,), (), 0.4, 0.2, 0.2, True)
+    passed = replace(balance, laws=())
+    errors = {id(balance): 0.4, id(passed): one_body_error}
+    balances = iter((balance, passed))
+    fit = actuator.ActuatorFit(IDEAL_ACTUATOR, curved, needs_no_motion_law=True)
+    monkeypatch.setattr(actuator, "search_with_linear_part", lambda *_: search)
+    monkeypatch.setattr(actuator, "judge_laws", lambda _: next(balances))
+    monkeypatch.setattr(actuator, "find_command_law", lambda *_: fit)
+    monkeypatch.setattr(actuator_equivalents, "_compute_one_body_error", lambda each: errors[id(each)])
+    found = actuator.find_balance([], actuator.DrivenAxis(0, False, target), frozenset(), lambda: True)
+    assert [law.law.effect for law in found.named] == (["force_nonlinearity"] if is_named else [])
+    assert [law.law.effect for law in found.laws] == ["force_nonlinearity", "coulomb_friction"][: 1 + (not is_named)]
+
+
+def test_the_error_of_one_body_is_that_without_its_modes(axis_module, find_balance):
+    physics = replace(axis_module.Physics(), second_mass=0.1, second_hz=5.0)
+    (balance,) = find_balance(axis_module.record_axis(physics, rate_hz=250.0))
+    assert balance.error < 0.1
+    assert actuator_equivalents._compute_one_body_error(balance) > 0.1

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.laws.law import Scales
+from analysis.diagnosis.balance.laws.motion_laws import make_dynamic_laws
 from tests.slow_instances import slow_after
 
 TRUTHS = {
@@ -27,8 +29,7 @@ NUMBERS = {
     "hardening_stiffness": {"k3": (3e4, 0.03)},
     "asymmetric_stiffness": {"k2": (350.0, 0.03)},
     "cogging": {"amplitude": (1.0, 0.05), "pitch": (0.012, 0.01)},
-    # The place of a stop is taken from a grid over the travel.
-    "end_stop": {"position": (0.04, 0.2), "stiffness": (800.0, 0.4)},
+    "end_stop": {"position": (0.04, 0.02), "stiffness": (800.0, 0.1)},
     "pose_dependent_inertia": {"per_m": (4.0, 0.03)},
     "position_dependent_friction": {"level": (1.0, 0.05), "slope_per_m": (8.0, 0.1)},
 }
@@ -84,6 +85,17 @@ def test_where_the_motion_is_imposed_and_the_force_is_read(axis_module, find_bal
     check_imposed_motion(axis_module, find_balance, effect)
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_inertia_that_would_be_negative_within_the_travel_is_no_physics(side):
+    low, high = sorted((-0.01 * side, 1.25 * side))
+    scales = Scales(1.0, 1.26, low, high, 10.0, 20.0, turns_freely=False, rotational=False)
+    (law,) = (law for law in make_dynamic_laws(0, scales) if law.effect == "pose_dependent_inertia")
+    assert law.convert_weights(np.array([-0.09 * side]), (), 0.1) is None
+    assert law.convert_weights(np.array([-0.07 * side]), (), 0.1) == pytest.approx(
+        {"per_m": -0.7 * side, "speed_share": 0.5}
+    )
+
+
 def test_where_the_motion_is_imposed_no_law_of_an_actuator_is_tried(axis_module, find_balance):
     (balance,) = find_balance(axis_module.record_imposed_motion(axis_module.Physics(), seconds=6.0, rate_hz=250.0))
     assert "amplifier_lag" not in {law.effect for law in balance.search.regression.laws}
@@ -117,7 +129,7 @@ def test_a_stop_beyond_zero_is_named_with_its_side(axis_module, find_balance):
     (law,) = balance.named
     assert law.law.effect == "end_stop"
     assert law.values["side"] == 1
-    assert law.values["position"] == pytest.approx(-0.02, abs=0.008)
+    assert law.values["position"] == pytest.approx(-0.02, abs=0.001)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.band import compute_band_begin_hz
+from analysis.diagnosis.balance.band import compute_band_begin_hz, compute_band_end_hz
 from analysis.diagnosis.balance.laws.motion_laws import make_laws
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signals
 from analysis.diagnosis.data.observed_parts import observe_parts
@@ -186,3 +186,26 @@ def test_the_band_of_a_noisy_acceleration_begins_where_its_double_integral_is_no
     is_usable = np.cumsum(noise_power[::-1])[::-1] <= largest_noise_power
     noisy = acceleration + noise_rms * random.normal(size=len(t))
     assert compute_band_begin_hz([noisy[:, None]], RATE_HZ) == frequency_hz[np.flatnonzero(is_usable)[0]]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_parts_far_shorter_than_the_longest_leave_the_band_of_all_as_it_is(order):
+    noise = 0.003 * exact_derivative(order).std() * np.random.default_rng(7).standard_normal((COUNT, 1))
+    long = exact_derivative(order) + noise
+    parts = [long, *(long[start : start + 300] for start in (0, 2000, 4000))]
+    assert compute_band_end_hz(parts, RATE_HZ, order) == compute_band_end_hz([long], RATE_HZ, order)
+    assert compute_band_begin_hz(parts, RATE_HZ) == compute_band_begin_hz([long], RATE_HZ)
+    assert compute_band_begin_hz([long, long[:1000]], RATE_HZ) == pytest.approx(4 * RATE_HZ / 1000)
+    assert compute_band_begin_hz([long, *parts[1:] * 10], RATE_HZ) == pytest.approx(4 * RATE_HZ / 300)
+
+
+def test_a_part_with_too_few_cycles_for_integrals_of_its_acceleration_has_no_valid_sample(record_samples):
+    recordings = [
+        record_samples(exact_derivative(2)[:count], exact_derivative(2)[:count], RATE_HZ, "acceleration")
+        for count in (COUNT, COUNT // 2, 600)
+    ]
+    valid_counts = [
+        motion.mask_valid_samples(motion.fit | motion.test).sum()
+        for motion in compute_motions(observe_parts(recordings, 1))
+    ]
+    assert [count > 0 for count in valid_counts] == [True, True, False]

@@ -46,6 +46,20 @@ def test_a_second_body_asks_for_another_fit(play_axis, axis_module):
     assert build_plain_model(*play_axis(replace(axis_module.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
 
 
+def test_beside_a_law_of_the_command_it_is_fitted_without_the_modes_that_it_lacks(play_axis, axis_module):
+    """A law of the command acts on the whole of it, so that no mode is subtracted from the command."""
+    from analysis.diagnosis.balance.judged_law import NO_COLUMN
+    from analysis.diagnosis.first_model.model_from_balance import build_plain_model
+
+    (balance,), recording = play_axis(replace(axis_module.Physics(), coulomb=0.8, second_mass=0.1, second_hz=5.0))
+    curved = replace(balance, laws=(replace(balance.named[0], law_index=NO_COLUMN),))
+    regression = balance.search.regression
+    assert regression.base_column_count > 4  # mass, damping, stiffness, a constant, and the second body
+    expected = regression.fit_weights([0, 1, 2, regression.base_column_count - 1])
+    model = build_plain_model((curved,), recording, "first")
+    assert [model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0]] == pytest.approx(list(expected[:3]))
+
+
 def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(rubbing):
     from analysis.diagnosis.first_model.model_from_balance import compute_law_power_share
 

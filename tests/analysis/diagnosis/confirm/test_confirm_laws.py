@@ -251,7 +251,7 @@ def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
     [(0.04, 1.0, 0.05), (-0.02, 1.0, 0.0), (-0.04, -1.0, -0.05), (0.02, -1.0, 0.0)],
 )
 def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, pushing_at_m):
-    values = _make_stop_converter(side)(np.array([800.0]), (position_m,), 1.0)
+    values = _make_stop_converter(side * 0.1, side)(np.array([800.0]), (0.1 - side * position_m,), 1.0)
     judged = SimpleNamespace(formula=None, law=SimpleNamespace(effect="end_stop", channel=0), values=values)
     assert can_be_simulated(0, judged)
 

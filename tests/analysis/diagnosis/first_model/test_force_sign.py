@@ -117,6 +117,19 @@ def test_a_command_that_moves_nothing_and_a_spring_alone_are_left_as_they_are(se
         assert convert_to_driven_motions((recording,)) == ((recording,), ())
 
 
+@pytest.mark.parametrize(("share", "is_reversed"), [(0.3, False), (0.8, True)])
+def test_a_motion_that_explains_little_of_a_force_does_not_determine_its_sign(share, is_reversed):
+    """As at a rigid wall, where the force comes and goes and hardly anything moves. share: of the force's power."""
+    push, other = smooth_noise(4000, 1), smooth_noise(4000, 2)
+    force = np.sqrt(1 - share) * other / other.std() - np.sqrt(share) * push / push.std()
+    recording = make_recording([("v", "velocity", "m/s", simulate_speed(push))], [("f", "force", "N", force)])
+
+    (found,), said = convert_to_driven_motions((recording,))
+
+    np.testing.assert_array_equal(found.response.samples[:, 0], -force if is_reversed else force)
+    assert (said != ()) == is_reversed
+
+
 def test_of_an_imposed_motion_the_measured_force_is_turned_round():
     push = smooth_noise(2000, 1)
     recording = make_recording([("v", "velocity", "m/s", simulate_speed(push))], [("f", "force", "N", -push)])

@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.first_model.choose_structure import choose_structure
 from analysis.diagnosis.first_model.free_motion import convert_free_motion, is_undriven_motion
 from analysis.diagnosis.first_model.model_structures import StructureFitError
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
+from analysis.diagnosis.search.time_budget import grant_time
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -78,6 +80,29 @@ def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
     held = found.improved.stiffness[0, 0] + weight.parameters["torque"].value
     assert held == pytest.approx(TURN_RAD_PER_S2, rel=0.05)
     assert found.improved.mass == pytest.approx(np.eye(1))
+
+
+def balance_of_coloured_decay(acceleration, seed: int):
+    """The force balance of one long decay under noise that falls with the frequency, unlike that of a converter."""
+    from scipy.signal import lfilter
+
+    angle = simulate_decay(acceleration, 1.2, 50, seed)
+    white = np.random.default_rng(seed + 50).standard_normal(len(angle))
+    (recording,), _ = convert_free_motion([make_recording(angle + 8e-4 * lfilter([0.5], [1, -0.87], white))])
+    return find_balances([recording], frozenset(), grant_time)[0]
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_weight_is_named_under_noise_that_hides_it_above_the_third_harmonic(seed):
+    balance = balance_of_coloured_decay(lambda q, v: -TURN_RAD_PER_S2 * np.sin(q) - 0.05 * v, seed)
+    (weight,) = balance.named
+    assert weight.law.effect == "gravity_torque"
+    assert weight.values["torque"] == pytest.approx(TURN_RAD_PER_S2, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_spring_under_such_noise_has_no_name(seed):
+    assert not balance_of_coloured_decay(lambda q, v: -SPRING * q - 0.05 * v, seed).named
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])

@@ -1,11 +1,14 @@
 """Whether more than noise is left over a whole recording, where no place stands out."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.mismatch_maps import STRETCH_COUNT, _test_against_noise
+from analysis.diagnosis.forces.predicted_force import PredictedForce
+from analysis.diagnosis.localisation import mismatch_maps
+from analysis.diagnosis.localisation.mismatch_maps import STRETCH_COUNT, _test_against_noise, compute_cells
 
 LENGTH = 50 * STRETCH_COUNT
 
@@ -39,3 +42,21 @@ def test_a_single_stretch_of_twice_the_noise_is_none():
     sizes = np.ones(STRETCH_COUNT)
     sizes[3] = 2.0
     assert noise_p_value(sizes) > 0.02
+
+
+@pytest.mark.parametrize(("band_hz", "listed_hz"), [(100.0, [16.0, 32.0, 64.0]), (80.0, [16.0, 32.0])])
+def test_no_mismatch_is_listed_above_the_band_in_which_forces_are_compared(monkeypatch, band_hz, listed_hz):
+    """Only the filter's remainder is there, which is not explained and means nothing."""
+    octaves = [SimpleCell((low_hz, 2 * low_hz)) for low_hz in (16.0, 32.0, 64.0, 128.0)]
+    monkeypatch.setattr(mismatch_maps, "compute_mismatch_cells", lambda *_: octaves)
+    recording = SimpleNamespace(sample_rate_hz=1000.0, response=SimpleNamespace(samples=np.zeros((9, 1))))
+    record = SimpleNamespace(recording=recording, measured=np.zeros((9, 1)))
+    measure = PredictedForce((record,), (), np.ones(1), np.ones(1), band_hz)
+    cells = compute_cells(measure, SimpleNamespace(residuals=(np.zeros((9, 1)),)), (None,))
+    assert [cell.band_hz[0] for cell in cells] == listed_hz
+
+
+@dataclass(frozen=True)
+class SimpleCell:
+    band_hz: tuple[float, float]
+    part: int = 0

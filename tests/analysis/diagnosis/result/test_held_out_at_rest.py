@@ -1,11 +1,14 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.result.error_table import is_held_out_still
+from analysis.diagnosis.result.assemble_findings import _collect_remarks, _describe_held_out_rest
+from analysis.diagnosis.result.black_box import _normalise_error
+from analysis.diagnosis.result.error_table import _compute_errors, find_resting_channels, is_held_out_still
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -55,6 +58,21 @@ def test_an_idle_axis_that_only_holds_noise_does_not_move(stop, size, still):
     assert is_held_out_still(observe_parts([shot], 1), np.repeat(NOISE, 2)) == still
 
 
+def test_a_channel_that_rests_where_another_moves_does_not_count_in_the_held_out_error():
+    """Relative to a reading that rests, any prediction is wrong by many times the signal."""
+    shot = record_wheel(np.stack([stopping_speed(MOVING), stopping_speed(N)], axis=1))
+    records = observe_parts([replace(shot, segments=LAST_QUARTER)], 2)
+    measure = SimpleNamespace(records=records, noise=np.repeat(NOISE, 2), unit=np.repeat(NOISE, 2))
+    assert find_resting_channels(records, measure.noise).tolist() == [True, False]
+    found = SimpleNamespace(fitted=SimpleNamespace(residuals=tuple(np.full((N, 2), 2.0) for _ in records)))
+    errors = _compute_errors(measure, SimpleNamespace(before=found, retuned=found, after=found), ("test",))
+    assert errors.retuned == pytest.approx(0.1 / records[0].measured[records[0].test, 1].std(), rel=1e-6)
+    assert _normalise_error(measure, np.full((int(records[0].test.sum()), 2), 2.0)) == pytest.approx(errors.retuned)
+    assert _describe_held_out_rest(measure, ("speed0", "speed1")).startswith(
+        "The held-out data contain no motion of speed0, so the error on them is that of the other channels."
+    )
+
+
 def test_where_nothing_moves_at_all_nothing_stands_still():
     noise = NOISE * np.random.default_rng(8).standard_normal(N)
     assert not is_held_out_still(observe_parts([record_wheel(noise)], 1), NOISE)
@@ -80,3 +98,17 @@ def test_a_stretch_at_rest_that_is_marked_as_test_stays_and_gives_no_error():
     assert said.diagnosis.fit.fit.retuned is not None
     moved = diagnose([moving], device(1), ASKED, map, lambda said, share: None)
     assert moved.diagnosis.fit.test.retuned is not None
+
+
+def test_remarks_on_the_noise_do_not_contradict_each_other():
+    """Parts whose noise is measured in other ways, or not at all."""
+    rest, unknown = "its noise was measured at rest.", "its noise is not known."
+    tuning = SimpleNamespace(model=SimpleNamespace(system=SimpleNamespace(has_force_unit=True)))
+
+    def collect(*remarks):
+        return _collect_remarks((("first",), ("",)), tuning, [SimpleNamespace(remarks=(said,)) for said in remarks])
+
+    assert collect(rest, rest) == ("first", rest)
+    assert collect(rest, unknown, rest) == (
+        "first", f"In 2 of 3 recordings or parts: {rest}", f"In 1 of 3 recordings or parts: {unknown}",
+    )  # fmt: skip

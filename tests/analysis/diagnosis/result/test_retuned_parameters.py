@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.retuned_parameters import (
     MovedParameter,
     describe_doubtful_parameters,
+    describe_raised_error,
     describe_retuning,
     list_parameters,
 )
@@ -60,4 +62,11 @@ def test_a_parameter_is_at_the_bound_of_its_own_search():
 def test_a_relative_change_is_read_as_per_cent():
     assert MovedParameter("mass of the mode at 82 Hz", -0.021, "1", -2.1).text == (
         "mass of the mode at 82 Hz −2.1 % (2.1 standard deviations)"
+    )
+    assert MovedParameter("damping of the mode at 13 Hz", -1.23, "1", -2.1).change_text == "−120 %"
+
+
+def test_an_error_of_many_times_the_signal_is_read_as_a_plain_number():
+    assert describe_raised_error(Errors(1453.4, 1861.0, None, None)).startswith(
+        "Re-tuning raises the error on held-out data from 1450 times to 1860 times the signal: "
     )

@@ -3,15 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.judge_laws import judge_laws
+from analysis.diagnosis.balance.judge_laws import judge_laws, judge_structure
 from analysis.diagnosis.balance.motion import compute_motions
-from analysis.diagnosis.balance.structures import search_structures
+from analysis.diagnosis.balance.structures import Structure, search_structures
+from analysis.diagnosis.confirm.laws_for_simulation import judge_special_cases
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
+from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.result.candidates import add_balances_with_fitted_model, collect_balance_errors
 from analysis.diagnosis.result.curves.state_maps import WITH_CANDIDATES, compute_state_maps
 from analysis.diagnosis.search.time_budget import grant_time
 from analysis.figures.diagnosis.state_maps import make_state_map_pictures
+from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -97,6 +100,28 @@ def test_how_far_names_reach_is_measured_on_held_out_blocks(friction_maps):
     assert reached.named_error == pytest.approx(reached.linear_error)
     assert reached.share == pytest.approx(0.0, abs=1e-6)
     assert reached.all_laws_error < 0.3 * reached.linear_error
+
+
+@pytest.mark.parametrize("preferred", ["coulomb_friction", "presliding_hysteresis"])
+def test_what_a_simulation_prefers_to_a_law_of_the_balance_has_its_errors_and_its_share(friction_maps, preferred):
+    """The balance chose presliding friction; the simulation preferred its special case, or kept it."""
+    balance, _, recording = friction_maps
+    search = balance.search
+    effects = [law.effect for law in search.regression.laws]
+    refined = (effects.index("presliding_hysteresis"),)
+    errors = search.regression.cross_validate(search.regression.select_columns(refined))
+    bent = judge_structure(search, Structure(refined, errors))
+    (kept,) = judge_special_cases((bent,), [Claim(EFFECTS[preferred], "one", (0,))])
+    assert (kept is bent) == (preferred == "presliding_hysteresis")
+
+    effect = NamedEffect(preferred, "mechanism", "force", 0.1, 0.1, {"level": Estimate(LEVEL, "N")})
+    named = replace(NOTHING, verdict="partly_explained", effects=(effect,), remainder=(PLACE,))
+    (reached,) = collect_balance_errors(named, (kept,), recording.command.channels)
+    assert reached.has_named_law
+    assert reached.named_error < 0.5 * reached.linear_error
+    (told,) = add_balances_with_fitted_model(named, (kept,), recording.command.channels).effects
+    assert told.share > 0.5
+    assert [law.law.effect for law in judge_special_cases((bent,), [])[0].laws] == ["presliding_hysteresis"]
 
 
 def test_states_and_loops_are_drawn_with_plain_units(friction_maps):
