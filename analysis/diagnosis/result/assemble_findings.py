@@ -66,11 +66,7 @@ def assemble_findings(
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
     unit_doubts = describe_measured_doubts(measure, tuning.model, floors, time_series)
-    measure_remarks = (
-        _describe_held_out_rest(measure, channels),
-        describe_model_error_floor(learned, channels),
-        in_samples,
-    )
+    measure_remarks = (_describe_rest(measure, channels), describe_model_error_floor(learned, channels), in_samples)
     return Findings(
         diagnosis=_build_document(result, errors, (maps, examination.localisation), proposal),
         explanation=fits,
@@ -112,7 +108,7 @@ def _build_models(result: SearchResult, recording: Recording) -> tuple[Mechanica
     )
 
 
-def _describe_held_out_rest(measure: ErrorMeasure, channels: Sequence[str]) -> str:
+def _describe_rest(measure: ErrorMeasure, channels: Sequence[str]) -> str:
     """Describe in a sentence that the held-out samples contain no motion, or none of some channels; empty where all
     move. channels: names."""
     if is_held_out_still(measure.records, measure.noise):
