@@ -87,7 +87,7 @@ def _write_lines(all_arrays: Arrays) -> Iterator[str]:
     yield from _write_parts(run_groups.prefixes)
     yield from _write_ungrouped_runs(ungrouped_names, run_groups)
     yield ""
-    yield "# Without segments, periods that repeat are found, and the end of each part is held out for the test."
+    yield "# Without segments, periods that repeat are found, and a diagnosis is tested on the end of each part."
     yield "# [[segment]]"
     yield '# kind = "noise"          # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
     yield "# split = { fit = 0.5, test = 0.5 }"

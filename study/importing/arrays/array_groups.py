@@ -12,11 +12,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from study.importing.surplus_arrays import is_growing_time
+
 _SEPARATORS = ("__", "/", ".", "_", " ")
 """Separators between the prefix of a run and the name of an array. Where several give equally many arrays, the first
 counts."""
 _AMBIGUOUS_SEPARATORS = ("_", " ", ".")
 """Separators that are common within names, too; a prefix before one of them must contain a digit."""
+_LATEST_FIRST_SAMPLE = 1.5
+"""Latest first sample of a run that counts its time or samples from its own beginning, in steps: 1, with a margin for
+rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +46,14 @@ def find_runs(arrays: Mapping[str, npt.NDArray[Any]], min_samples: int) -> RunGr
 
 def _are_simultaneous(arrays: Mapping[str, npt.NDArray[Any]], groups: RunGroups) -> bool:
     """Whether the first two groups are parts of one run, such as the scopes of a Simulink model: both contain the same
-    rising times, and these do not begin at zero, where each of several runs may begin."""
+    rising times, and these begin later than a step after zero, where each of several runs may begin."""
     first, second = groups.prefixes[:2]
     for name in groups.names:
         times = arrays[first + name]
-        is_rising = (
-            times.ndim == 1 and times.dtype.kind in "fiu" and len(times) > 1 and bool((np.diff(times) > 0).all())
-        )
-        if is_rising and times[0] != 0 and np.array_equal(times, arrays[second + name]):
-            return True
+        if is_growing_time(name, times) and np.array_equal(times, arrays[second + name]):
+            first_step = times[times > times[0]][0] - times[0]
+            if times[0] < 0 or times[0] > _LATEST_FIRST_SAMPLE * first_step:
+                return True
     return False
 
 

@@ -2,8 +2,8 @@
 
 Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
 record per line; https://jsonlines.org). Arrays inside an object have its name as prefix (`run1/u`), unless it is the
-only object with arrays of several values. Records that hold lists of several lengths are runs; their prefix is their
-number (`data/1/u`).
+only object with arrays of several values. Records that hold long lists of several lengths are runs; their prefix is
+their number (`data/1/u`).
 """
 
 import re
@@ -37,6 +37,8 @@ _UNIT_KEYS = ("unit", "units")
 """Keys that state the unit of the values in the same object."""
 _VALUE_KEYS = ("values", "value", "data", "samples")
 """Keys of the values in an object with a unit and several lists; the first one found counts."""
+_LEAST_RUN_SAMPLES = 16
+"""Least length of a list that may be the signal of a run, as `surplus_arrays.LEAST_SAMPLES` of any signal."""
 
 
 def read_json_arrays(path: Path) -> dict[str, Array]:
@@ -130,13 +132,17 @@ def _find_arrays_in_object(
 
 
 def _are_runs(records: list[dict[str, Any]]) -> bool:
-    """Whether each record holds a run: the lists under some key have several lengths, and so are no table."""
-    lengths_by_key: dict[str, set[int]] = {}
+    """Whether each record holds a run: the lists under some key have several lengths, and so are no table, and most
+    records have a long one there, unlike the contacts or events at each time in a table."""
+    lengths_by_key: dict[str, list[int]] = {}
     for record in records:
         for key, entry in record.items():
-            if isinstance(entry, list) and entry and all(map(_is_number, entry)):
-                lengths_by_key.setdefault(key, set()).add(len(entry))
-    return any(len(lengths) > 1 for lengths in lengths_by_key.values())
+            if isinstance(entry, list) and all(map(_is_number, entry)):
+                lengths_by_key.setdefault(key, []).append(len(entry))
+    return any(
+        len(set(lengths)) > 1 and 2 * sum(length >= _LEAST_RUN_SAMPLES for length in lengths) > len(records)
+        for lengths in lengths_by_key.values()
+    )
 
 
 def _is_number(entry: Any) -> bool:

@@ -83,32 +83,48 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
 
 def complete_rows_of_events(rows: Sequence[Line], settings: CsvMap) -> Sequence[Line]:
     """Give all rows as many fields as the header where its last columns hold words, and most rows lack them, as loggers
-    write events (`DAQ Pause`); other rows are unchanged. Only where a line without numbers, the header, and rows of
-    numbers have more fields than most rows, and all these surplus fields are words: they show which columns most rows
-    lack. Of several events in a row (`DAQ Pause, DAQ Stop`), those beyond the header are left out."""
-    for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS[:-1]:
-        widths = [0 if is_comment(text) else 1 + text.count(delimiter) for _, text in rows]
+    write events (`DAQ Pause`); other rows are unchanged. Only where `_find_width_with_events` shows which columns most
+    rows lack. Of several events in a row (`DAQ Pause, DAQ Stop`), those beyond the header are left out."""
+    for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
+        if delimiter == " ":  # several may separate two fields, so that no missing field is seen
+            continue
+        widths = [1 + text.count(delimiter) for _, text in rows]
         width = Counter(widths[len(widths) // 2 :]).most_common(1)[0][0] if widths else 1
-        wide_rows = [
-            split_row(text, delimiter)
-            for (_, text), row_width in zip(rows, widths, strict=True)
-            if row_width > width > 1
-        ]
-        has_numbers = [any(has_number(fields[:width], decimal) for decimal in ".,") for fields in wide_rows]
-        header_widths = {len(fields) for fields, is_data in zip(wide_rows, has_numbers, strict=True) if not is_data}
-        if (
-            len(header_widths) == 1
-            and any(has_numbers)
-            and all(is_text(field) for fields in wide_rows for field in fields[width:])
-        ):
-            surplus = header_widths.pop() - width
-            return [
-                (number, delimiter.join([*text.split(delimiter), *[""] * surplus][: width + surplus]))
-                if row_width >= width
-                else (number, text)
-                for (number, text), row_width in zip(rows, widths, strict=True)
-            ]
+        if 1 < width < max(widths):
+            header_width = _find_width_with_events(rows, width, delimiter)
+            if header_width:
+                return [(number, _fit_row(text, delimiter, width, header_width)) for number, text in rows]
     return rows
+
+
+def _find_width_with_events(rows: Sequence[Line], width: int, delimiter: str) -> int:
+    """Find the number of fields of the header, a line without numbers; 0 unless it and some rows of numbers have more
+    than `width` fields, none of these rows fewer than the header, and all surplus fields are words. A row with fewer
+    does not show which column its words belong to: a name may contain the delimiter (`force, N`)."""
+    header_widths: set[int] = set()
+    event_widths: set[int] = set()
+    for _, text in rows:
+        if text.count(delimiter) < width or is_comment(text):
+            continue
+        fields = split_row(text, delimiter)
+        if not all(map(is_text, fields[width:])):
+            return 0
+        if len(fields) > width:
+            is_data = any(has_number(fields[:width], decimal) for decimal in ".,")
+            (event_widths if is_data else header_widths).add(len(fields))
+    is_certain = len(header_widths) == 1 and bool(event_widths) and min(event_widths) >= max(header_widths)
+    return header_widths.pop() if is_certain else 0
+
+
+def _fit_row(text: str, delimiter: str, width: int, header_width: int) -> str:
+    """Give a row of at least `width` fields `header_width` fields; comments, shorter rows and longer ones with quotes
+    are unchanged."""
+    field_count = len(split_row(text, delimiter))
+    if field_count < width or is_comment(text):
+        return text
+    if field_count > header_width and '"' not in text:
+        return delimiter.join(text.split(delimiter)[:header_width])
+    return text + delimiter * (header_width - field_count)
 
 
 def _select_number_rows(sample: Sequence[Line], marks: TableMarks) -> list[list[str]]:

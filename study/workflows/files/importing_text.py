@@ -136,8 +136,8 @@ _FILES = """\
 * **JSON.** Three forms: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [0, ...], "u": [1, ...]}`), or a record in
   each line. Names of nested values begin with their object (`imu.x` of records, `run1/u` of columns). A unit beside
   values belongs to them (`{"unit": "N", "values": [...]}`). A number beside values, such as a scale, is refused, and so
-  is a duplicate key. Objects that are alike and numbered (`run1`, `run2`) are parts, and so are records that hold lists
-  of several lengths (`data/1/u`).
+  is a duplicate key. Objects that are alike and numbered (`run1`, `run2`) are parts, and so are records most of which
+  hold lists of at least 16 values, of several lengths (`data/1/u`).
 * **Matlab cells** (-v6, -v7) whose arrays are alike contain one run per array. `y` of a cell of three arrays is
   `1-of-3/y`, `2-of-3/y`, `3-of-3/y`; `prefix = "2-of-3/"` selects a part. A part whose arrays have other names states
   them, as in `let = { y = "y_test" }`.

@@ -7,14 +7,15 @@ states files, map and notes, so that its origin can be traced. `read_foreign` im
 
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 from equalizer.signals.joining import join_recordings, list_dropped_signals
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, find_parts
 from equalizer.signals.recording_checks import find_duplicates
 from study.errors import WrongUseError
 from study.importing.arrays.read_arrays import Arrays
@@ -203,7 +204,8 @@ def _read_hapteq_recordings(files: Sequence[Path]) -> ForeignRecording:
     recordings = [read_recording(path) for path in files]
     if len(recordings) == 1:
         return ForeignRecording(recordings[0], tuple(files), "recording", "", ())
-    parts = [{"file": path.name, **recording.meta} for path, recording in zip(files, recordings, strict=True)]
+    starts = accumulate(map(len, recordings[:-1]), initial=0)
+    parts = [part for triple in zip(files, recordings, starts, strict=True) for part in _list_parts(*triple)]
     try:
         joined_recording = join_recordings(recordings, {"parts": parts})
     except ValueError as error:
@@ -216,6 +218,21 @@ def _read_hapteq_recordings(files: Sequence[Path]) -> ForeignRecording:
     samples = [(recording.command.samples, recording.response.samples) for recording in recordings]
     notes += [f"{duplicate}." for duplicate in find_duplicates(samples, [path.name for path in files])]
     return ForeignRecording(joined_recording, tuple(files), "recording", "", tuple(notes))
+
+
+def _list_parts(path: Path, recording: Recording, offset: int) -> Iterator[dict[str, Any]]:
+    """List the parts of a recording that is put `offset` samples after the beginning of another, for the metadata: its
+    own parts or, without any, the whole; each with the metadata of the recording."""
+    stated_parts = recording.meta.get("parts")
+    facts_by_range = {
+        (part.get("start"), part.get("stop")): part
+        for part in (stated_parts if isinstance(stated_parts, list | tuple) else ())
+        if isinstance(part, dict)
+    }
+    metadata = {key: value for key, value in recording.meta.items() if key != "parts"}
+    for start, stop in find_parts(recording):
+        facts = facts_by_range.get((start, stop), {})
+        yield {"file": path.name, **metadata, **facts, "start": offset + start, "stop": offset + stop}
 
 
 def _import_by_header(files: Sequence[Path], on_progress: ProgressCallback) -> ForeignRecording:

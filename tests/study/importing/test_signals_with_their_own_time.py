@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from study.importing.arrays.array_groups import find_runs
 from study.importing.arrays.read_arrays import read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import find_header_problems
@@ -82,14 +83,20 @@ def test_several_structures_are_numbered(tmp_path):
     assert 'value = "scope.signals.1.values"' in proposed(tmp_path / "a.mat")
 
 
-@pytest.mark.parametrize(("start_s", "are_runs"), [(34.26, False), (0.0, True)])
+@pytest.mark.parametrize(("start_s", "are_runs"), [(34.26, False), (0.0, True), (SLOW[1] - SLOW[0], True)])
 def test_scopes_of_one_recording_are_no_runs(tmp_path, start_s, are_runs):
-    """Runs may each begin at zero; at another time only what was recorded at once begins together."""
+    """Runs may each begin at zero, or a step later; at another time only what was recorded at once begins together."""
     scopes = {f"scope{number}": signal(SLOW + start_s, number * FORCE) for number in (1, 2)}
     savemat(tmp_path / "a.mat", scopes)
     text = proposed(tmp_path / "a.mat")
     assert ("[[part]]" in text) == are_runs
     assert ('value = "scope2.signals.values"' in text) != are_runs
+
+
+def test_runs_with_the_same_rising_command_are_runs():
+    command = 2 + np.arange(40.0)
+    arrays = {f"run{run}/{name}": array for run in (1, 2) for name, array in (("u", command), ("y", run * command))}
+    assert find_runs(arrays, 16).prefixes == ("run1/", "run2/")
 
 
 def element(kind, content):

@@ -119,6 +119,11 @@ def test_records_that_hold_vectors_of_one_length_are_a_table(tmp_path):
     assert (found["t"].tolist(), found["imu"].shape) == (TIME, (3, 3))
 
 
+def test_records_that_hold_short_lists_of_several_lengths_are_a_table(tmp_path):
+    found = read(tmp_path, [{"t": 0.1 * k, "u": k, "contacts": list(range(k % 3))} for k in range(40)]).by_name
+    assert (found["t"].shape, found["u"].tolist()) == ((40,), list(range(40)))
+
+
 def test_a_document_of_ours_is_told_from_a_table(tmp_path):
     (tmp_path / "a.json").write_text(json.dumps(RECORDS))
     (tmp_path / "d.json").write_text(json.dumps({"format": "hapteq-diagnosis", "version": 1}))

@@ -150,11 +150,25 @@ def test_events_at_the_ends_of_some_rows_are_a_column_of_words(tmp_path):
         LOGGED.replace("paused", "7"),
         LOGGED.replace("4, 0.3, 4", "4, 0.3"),
         LOGGED + "5, 0.4, 5, stopped, 7\n",
+        LOGGED.replace("force [N]", "force, N"),  # without the unit's column, events would give the names
     ],
 )
 def test_rows_are_not_completed_by_guess(tmp_path, text):
     with pytest.raises(ImportRefusedError, match="Line [0-9]+ has [0-9] fields"):
         read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "delimiter", "expected"),
+    [
+        ('t,"F, N"\n0,1\n1,"1,5"\n2,2\n3,3\n', "", {"t": [0, 1, 2, 3], "F, N": [1, 1.5, 2, 3]}),
+        ('t,u,"note, text"\n0,1,ok\n1,2,"a, b"\n2,2,ok\n3,3,ok\n', "", {"t": [0, 1, 2, 3], "u": [1, 2, 2, 3]}),
+        ("t    u   y\n 0   5   3\n 1   -5    3\n 2   2   4\n", " ", {"t": [0, 1, 2], "u": [5, -5, 2], "y": [3, 3, 4]}),
+    ],
+)
+def test_rows_of_more_delimiters_but_no_more_fields_keep_their_fields(tmp_path, text, delimiter, expected):
+    found = read(tmp_path, text, CsvMap(delimiter=delimiter)).by_name
+    assert {name: column.tolist() for name, column in found.items()} == expected
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])

@@ -44,3 +44,15 @@ def test_a_file_of_a_stranger_is_read_and_imported(tmp_path, name, write):
         np.testing.assert_array_equal(recording.command.samples[:, 0], [row[1] for row in ROWS])
         np.testing.assert_allclose(recording.response.samples[:, 0], [row[2] / 1000 for row in ROWS])
     assert any("1 row logged twice" in note for note in notes) == (name == "a.csv")
+
+
+def test_recordings_that_are_joined_keep_their_parts(tmp_path):
+    for number in (1, 2, 3):
+        _records(tmp_path / f"run_{number}.json")
+    runs = tuple(tmp_path / f"run_{number}.json" for number in (1, 2, 3))
+    import_recording(ImportPlan(runs[:2], None, tmp_path / "a.h5"))
+    import_recording(ImportPlan(runs[2:], None, tmp_path / "b.h5"))
+    joined = import_recording(ImportPlan((tmp_path / "a.h5", tmp_path / "b.h5"), None, tmp_path / "r.h5")).recording
+    assert [(part["file"], part["start"], part["stop"]) for part in joined.meta["parts"]] == [
+        ("run_1.json", 0, 60), ("run_2.json", 60, 120), ("run_3.json", 120, 180),
+    ]  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 from scipy.io import savemat
 
 from analysis.look.clock import check_clock
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, find_parts
 from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
@@ -176,6 +176,7 @@ def test_recordings_of_ours_are_taken_as_they_are_and_joined(tmp_path):
     assert len(two.recording) == 400
     assert two.notes == ("2 recordings were put one after another; time stamps were left out.",)
     assert [part["file"] for part in two.recording.meta["parts"]] == ["a.h5", "b.h5"]
+    assert find_parts(two.recording) == ((0, 200), (200, 400))
 
 
 def test_recordings_of_ours_that_do_not_fit_together_are_refused(tmp_path):
