@@ -50,16 +50,25 @@ def list_recording_problems(recordings: Sequence[Recording], names: Sequence[str
 
 def find_duplicates(contents: Sequence[Sequence[npt.ArrayLike]], names: Sequence[str]) -> Iterator[str]:
     """Find recordings with the same content as an earlier one, as of a file that is given twice: they would count
-    twice, and a model would be tested by the data that it was fitted to. Yields a sentence per such recording.
-    contents: of each, its commands and responses."""
+    twice, and a model would be tested by the data that it was fitted to. Those of a device at rest, whose channels are
+    all constant, may be alike. Yields a sentence per such recording. contents: of each, its commands and responses."""
     if len(contents) < 2:
         return
     first_names: dict[bytes, str] = {}
     for arrays, name in zip(contents, names, strict=True):
-        digest = sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).digest()
-        if digest in first_names:
+        content_hash = sha256()
+        for array in arrays:
+            content_hash.update(np.ascontiguousarray(array).tobytes())
+        digest = content_hash.digest()
+        if digest in first_names and not all(map(_is_constant, arrays)):
             yield f"{name} holds the same samples as {first_names[digest]}, and a recording counts once: leave it out"
         first_names.setdefault(digest, name)
+
+
+def _is_constant(array: npt.ArrayLike) -> bool:
+    """Whether an array of samples (n,) or (n, channels) is constant; True for texts, which are no samples."""
+    samples = np.asarray(array)
+    return samples.dtype.kind == "U" or bool((samples == samples[:1]).all())
 
 
 def _find_foreign_units(recording: Recording) -> Iterator[str]:

@@ -116,6 +116,12 @@ def test_arrays_in_units_outside_si_are_a_problem_of_the_named_recording(recordi
     assert unknown.startswith("c: command x: 'furlong' is not a unit known here")
 
 
+def test_recordings_of_a_device_at_rest_may_be_alike(recording):
+    moved = replace(recording, response=replace(recording.response, samples=np.arange(200.0).reshape(100, 2)))
+    (problem,) = list_recording_problems([recording, recording, moved, replace(moved, device="copy")], "abcd")
+    assert problem == "d holds the same samples as c, and a recording counts once: leave it out"
+
+
 @pytest.mark.parametrize(("unit", "si"), [("counts", "1"), ("Nm", "N m")])
 def test_a_unit_of_the_same_scale_needs_no_conversion(recording, unit, si):
     said, _ = list_recording_problems([replace(recording, command=replace(recording.command, unit=unit))])

@@ -71,7 +71,8 @@ def _mask_surplus_periods(recording: Recording) -> Mask:
 
 
 def cut_part(recording: Recording, start: int, stop: int) -> Recording:
-    """Cut the recording to samples start to stop (exclusive), with its segments cut to this range."""
+    """Cut the recording to samples start to stop (exclusive), with its segments cut to this range. The metadata "parts"
+    of a recording that is cut are left out, because they count the samples of the whole one."""
     if (start, stop) == (0, len(recording)):
         return recording
     segments = [
@@ -88,6 +89,7 @@ def cut_part(recording: Recording, start: int, stop: int) -> Recording:
         condition=_cut_signal(recording.condition, start, stop),
         time_s=None if recording.time_s is None else recording.time_s[start:stop],
         segments=tuple(segments),
+        meta={key: value for key, value in recording.meta.items() if key != "parts"},
     )
 
 

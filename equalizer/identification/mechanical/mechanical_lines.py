@@ -6,7 +6,7 @@ ends is fitted with the model. Spectra are rfft / length, in the signals' units.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -187,7 +187,8 @@ def split_fit_and_test(
 ) -> tuple[list[tuple[Recording, Segment]], list[tuple[Recording, Segment]]]:
     """Split the driven segments into those to fit and those held out for a test. Held out are the segments with the
     role "test"; where all segments or no driven ones have it, the last of more than 2 m segments (m commands), or the
-    last third of a single segment that is not periodic, else none."""
+    last third of a single segment that is not periodic, or of the longest part of a single recording without segments,
+    else none."""
     driven_segments = [
         (recording, segment) for recording in recordings for segment in _iterate_driven_segments(recording)
     ]
@@ -197,18 +198,18 @@ def split_fit_and_test(
         return fit_segments, test_segments
     if not driven_segments:
         return [], []
-    fit_segments = driven_segments
+    fit_segments = [*driven_segments]
     if len(fit_segments) > 2 * fit_segments[0][0].command.samples.shape[1]:
         return fit_segments[:-1], fit_segments[-1:]
-    recording, last_segment = fit_segments[-1]
-    if len(fit_segments) == 1 and not last_segment.period:
-        split_sample = last_segment.start + 2 * (last_segment.stop - last_segment.start) // 3
-        parts = (
-            Segment(last_segment.start, split_sample, last_segment.kind, last_segment.amplitude, 0, "fit"),
-            Segment(split_sample, last_segment.stop, last_segment.kind, last_segment.amplitude, 0, "test"),
-        )
-        return [(recording, parts[0])], [(recording, parts[1])]
-    return fit_segments, []
+    lengths = [segment.stop - segment.start for _, segment in fit_segments]
+    recording, longest = fit_segments.pop(lengths.index(max(lengths)))
+    is_alone = not fit_segments or (len(recordings) == 1 and not recording.segments)
+    if not is_alone or longest.period:
+        return driven_segments, []
+    split_sample = longest.start + 2 * (longest.stop - longest.start) // 3
+    fit_part = replace(longest, stop=split_sample, role="fit")
+    test_part = replace(longest, start=split_sample, role="test")
+    return [*fit_segments, (recording, fit_part)], [(recording, test_part)]
 
 
 def _iterate_driven_segments(recording: Recording) -> Iterator[Segment]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.observed_parts import count_fit_samples, observe_parts
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Recording, Segment, list_segments
 from equalizer.signals.signal import Signal
 
 RATE_HZ, LONG = 1000.0, 1000
@@ -42,3 +42,10 @@ def test_where_the_middle_level_was_lost_some_of_what_is_left_is_chosen_by():
     assert one.choose.any() and one.fit.any() and one.test.any()
     assert np.isfinite(lost[one.fit | one.choose | one.test]).all()
     assert count_fit_samples([recording]) == one.fit.sum()
+
+
+def test_each_part_is_one_segment_where_none_is_stated():
+    parts = [{"start": 0, "stop": 500}, {"start": 500, "stop": 1200}, {"start": 1200, "stop": 3000}]
+    recording = replace(record_three_levels(), segments=(), meta={"parts": parts})
+    segments = [list_segments(part.recording) for part in observe_parts([recording], 1)]
+    assert segments == [(Segment(0, length, "noise"),) for length in (500, 700, 1800)]

@@ -50,8 +50,12 @@ def test_without_segments_each_part_of_a_recording_is_one():
     parts = [{"start": 0, "stop": 900}, {"start": 900, "stop": 920}, {"start": 920, "stop": 2000}]
     command = np.random.default_rng(4).standard_normal((2000, 1))
     joined = replace(recording(command, command), meta={"parts": parts})
-    expected = [Segment(0, 900, "noise"), Segment(920, 2000, "noise")]  # of the middle part, 20 samples are too short
-    assert [segment for _, segment in split_fit_and_test([joined])[0]] == expected
+    fit, test = ([segment for _, segment in pairs] for pairs in split_fit_and_test([joined]))
+    # Of the middle part, 20 samples are too short; the last third of the longest part is for the test.
+    assert fit == [Segment(0, 900, "noise"), Segment(920, 1640, "noise", role="fit")]
+    assert test == [Segment(1640, 2000, "noise", role="test")]
+    whole, short = replace(joined, meta={}), recording(command[:900], command[:900])
+    assert [len(pairs) for pairs in split_fit_and_test([whole, short])] == [2, 0]
     windows = collect_window_experiments([joined], 0.2).experiments  # of 100 samples, each 50 after the last
     assert len(windows) == 17 + 20
 
