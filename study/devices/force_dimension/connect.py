@@ -5,9 +5,10 @@ after `open_model`, closing is the caller's task. Called by `open_rig` (sessions
 `linkage`.
 """
 
+import contextlib
 import os
 import threading
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
 
 from study.devices.force_dimension.device_models import DeviceModel, find_model_key
 from study.devices.force_dimension.handle import Handle
@@ -56,7 +57,7 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
     device_count = max(0, int(library.get_function("dhdGetDeviceCount")()))
     for device_index in range(min(MAX_DEVICES, device_count)):
         try:
-            handle = _open_in_time(library, device_index, model)
+            handle = _open_in_time(library, device_index)
         except LibraryError as error:
             failures.append(error)
             continue
@@ -78,35 +79,39 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
     raise DeviceError(missing_error.title, f"{missing_error.happened} {count_text}", missing_error.do_now)
 
 
-def _open_in_time(library: Library, device_index: int, model: DeviceModel) -> Handle:
-    """Open a device in a thread of its own, so that a USB transfer that hangs blocks neither this thread nor its
-    interruption; a device that opens too late is closed again. Raises `LibraryError`, and `DeviceError` after
+def _open_in_time(library: Library, device_index: int) -> Handle:
+    """Open a device in a thread of its own, so that a USB transfer that hangs does not block this thread. A device that
+    opens too late, or after an interruption, is closed again. Raises `LibraryError`, and `DeviceError` after
     `OPENING_TIMEOUT_S`."""
     opened: Future[int] = Future()
 
     def open_device() -> None:
+        """Open the device, and close it again where nobody waits for it any more. The function of the thread."""
         try:
             number = library.call("dhdOpenID", device_index)
-        except LibraryError as error:
-            if opened.set_running_or_notify_cancel():
+        except BaseException as error:  # noqa: BLE001 - raised where it is awaited
+            with contextlib.suppress(InvalidStateError):
                 opened.set_exception(error)
-        else:
-            if opened.set_running_or_notify_cancel():
-                opened.set_result(number)
-            else:
-                Handle(library, number).disconnect()
+            return
+        try:
+            opened.set_result(number)
+        except InvalidStateError:
+            Handle(library, number).disconnect()
 
     threading.Thread(target=open_device, name="dhdOpenID", daemon=True).start()
     try:
         return Handle(library, opened.result(OPENING_TIMEOUT_S))
-    except TimeoutError as error:
+    except BaseException as error:
+        if not opened.cancel() and opened.exception() is None:  # it has just been opened
+            Handle(library, opened.result()).disconnect()
+        if not isinstance(error, TimeoutError):
+            raise
         raise DeviceError(
-            f"The {model.name} does not answer",
-            f"The vendor's library did not open it within {OPENING_TIMEOUT_S:g} s: its USB connection hangs.",
+            "The device does not answer",
+            f"The vendor's library did not open its device number {device_index + 1} within "
+            f"{OPENING_TIMEOUT_S:g} s: its USB connection hangs.",
             "Unplug its USB cable, switch it off and on, plug it in again, then try again.",
         ) from error
-    finally:
-        opened.cancel()
 
 
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:

@@ -170,14 +170,18 @@ def _collect_readings(recording: Recording, path: Path) -> FloatArray:
 
 
 def _turn_to_device(recording: Recording, path: Path) -> FloatArray:
-    """Turn the accelerations (n, 3), m/s², from the sensor's axes to the device's. Raises `DeviceError` for a frame
-    that is no rotation."""
+    """Turn the accelerations (n, 3), m/s², from the sensor's axes to the device's; a missing one is missing only on the
+    axes of the device that depend on it. Raises `DeviceError` for a frame that is no rotation."""
     try:
         rotation = read_sensor_frame(recording)
     except ValueError as error:
         raise _make_replay_error(f"{path.name}: {error}.") from error
     accelerations = _arrange_axes(recording.response, "a")
-    return accelerations if rotation is None else np.asarray(accelerations @ rotation.T)
+    if rotation is None:
+        return accelerations
+    is_missing = np.isnan(accelerations)
+    is_unknown = is_missing @ (rotation.T != 0.0)
+    return np.where(is_unknown, np.nan, np.where(is_missing, 0.0, accelerations) @ rotation.T)
 
 
 def _estimate_noise_mps2(acceleration: FloatArray) -> float:

@@ -163,8 +163,8 @@ def _read_transient(path: Path, model: IdentifiedModel) -> FloatArray:
     than the model's, or too many rows."""
     table = read_trajectory(path)
     if table.kind is not TRAJECTORY:
-        header = ",".join(TRAJECTORY.header)
-        raise TableError((f"the table {path.name} holds {table.kind.name}; its header must be {header}",))
+        header, expected_header = ",".join(table.kind.header), ",".join(TRAJECTORY.header)
+        raise TableError((f"the table {path.name} has the header {header}; it must be {expected_header}",))
     require_rate(table, model.sample_rate_hz)
     if len(table.signal) > MAX_TRANSIENT_ROWS:
         raise TableError(

@@ -3,6 +3,7 @@
 import contextlib
 import subprocess
 import time
+from concurrent.futures import Future
 from dataclasses import replace
 
 import pytest
@@ -128,7 +129,7 @@ def test_a_failed_opening_names_the_cause_and_leaves_the_brakes_on(stub, opened,
 
 
 def test_a_device_that_hangs_while_it_is_opened_is_reported_and_closed_when_it_opens_late(stub, opened, monkeypatch):
-    monkeypatch.setattr(connect, "OPENING_TIMEOUT_S", 0.2, raising=False)
+    monkeypatch.setattr(connect, "OPENING_TIMEOUT_S", 0.2)
     stub.delay("dhdOpenID", 3.0, times=1)
     said = refused(opened)
     assert stub.get("closes") == 0
@@ -138,6 +139,30 @@ def test_a_device_that_hangs_while_it_is_opened_is_reported_and_closed_when_it_o
         assert time.monotonic() < until_s
         time.sleep(0.05)
     assert stub.safe and stub.get("opened") == 0
+
+
+@pytest.mark.parametrize("reason", [TimeoutError, KeyboardInterrupt])
+def test_a_device_that_opens_in_the_moment_in_which_the_wait_ends_is_closed(stub, opened, monkeypatch, reason):
+    class EndedLate(Future):
+        def result(self, timeout=None):
+            number = super().result()
+            if timeout is None:
+                return number
+            raise reason
+
+    monkeypatch.setattr(connect, "Future", EndedLate)
+    with pytest.raises(DeviceError if reason is TimeoutError else reason), opened():
+        pass
+    assert (stub.get("opened"), stub.get("closes")) == (0, 1)
+
+
+def test_a_library_that_crashes_while_it_opens_a_device_is_not_said_to_hang(stub, opened, monkeypatch):
+    def crash(library, name, *arguments):
+        raise OSError("exception: access violation reading 0x0000000000000000")
+
+    monkeypatch.setattr(connect.Library, "call", crash)
+    with pytest.raises(OSError, match="access violation"), opened():
+        pass
 
 
 def test_without_a_watchdog_it_opens_where_no_hand_is_on_the_handle(stub, opened):

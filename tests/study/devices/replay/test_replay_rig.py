@@ -53,10 +53,12 @@ def test_commands_that_were_recorded_are_answered_as_they_were_in_any_order(rigs
 def test_accelerations_of_a_turned_sensor_are_replayed_in_the_axes_of_the_device(rigs, commands, originals, tmp_path):
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     (original, *_), frame = originals, {"sensor": {"frame_to_device": turn.tolist()}}
-    measured = replace(original.response, samples=original.response.samples @ turn)
+    right = original.response.samples.copy()
+    right[7, 1] = np.nan  # on one axis of the sensor alone
+    measured = replace(original.response, samples=right[:, [1, 0, 2]] * [1.0, -1.0, 1.0])
     write_recording(tmp_path / "turned.h5", replace(original, response=measured, meta=frame))
     (found,) = played_on(f"replay:{tmp_path / 'turned.h5'}", rigs, commands[:1])
-    np.testing.assert_array_equal(found.response.samples, original.response.samples)
+    np.testing.assert_array_equal(found.response.samples, right)
     mirrored = {"sensor": {"frame_to_device": np.diag([1.0, 1.0, -1.0]).tolist()}}
     write_recording(tmp_path / "mirrored.h5", replace(original, meta=mirrored))
     with pytest.raises(DeviceError, match=r"mirrored\.h5: the sensor's frame is a reflection"):

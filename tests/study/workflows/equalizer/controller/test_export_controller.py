@@ -199,8 +199,8 @@ def test_numbers_are_written_to_their_last_bit(exported):
     [
         ("there already", "exists already"),
         ("two axes", "not of three forces"),
-        ("forces", "The table table.csv holds forces; its header must be time_s,ax,ay,az."),
-        ("one axis", "The table table.csv holds transient; its header must be time_s,ax,ay,az."),
+        ("forces", "The table table.csv has the header time_s,fx,fy,fz; it must be time_s,ax,ay,az."),
+        ("one axis", "The table table.csv has the header time_s,a; it must be time_s,ax,ay,az."),
         ("rate", "at 500 Hz"),
         ("long", "5001 rows"),
         ("preview", "2 s is the longest"),
