@@ -106,8 +106,8 @@ def search_by_simulation(
 
 
 class _ImpactSearch:
-    """Search for rattling play, compared by band power. It runs once, before a third effect or at the end, and again
-    only where it did not reject play and the result has gained effects since, which are then rivals of play."""
+    """Search for rattling play, compared by band power. It runs once, before a second or third effect or at the end,
+    and again only where it did not reject play and the result has gained effects since: these are rivals of play."""
 
     def __init__(
         self, fitting: FittingMeasure, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import StateSpace, lsim
 
+import equalizer.effects.simulation.simulator as simulator
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.effects.catalogue import CATALOGUE
@@ -102,6 +103,7 @@ def concealed(number: int) -> Case:
 
 
 def main() -> int:
+    simulator.KEPT_BYTES = 0  # a recording that is given twice is simulated twice
     diagnosed(draw_case(SEED, ["coulomb_friction"]), tuple(each.name for each in CATALOGUE[3:]))
     ratios, walls, last = [], [], None
     for number, effects in enumerate(EFFECTS):

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "contracts"))
 import effect_bench
 
+import equalizer.effects.simulation.simulator as simulator
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism, simulate_response
@@ -55,6 +56,7 @@ def report(line: str) -> None:
 
 
 def main() -> int:
+    simulator.KEPT_BYTES = 0  # every repeat is simulated, none recalled
     model, some = effect_bench.three_axes(), effect_bench.commands(3)
     commands = np.tile(some, (SAMPLES // len(some) + 1, 1))[:SAMPLES]
     short = commands[:PLAIN_SAMPLES]

@@ -216,26 +216,26 @@ def exchange_first_for_relatives(
     if len(related_effects) < 2 or is_small or not _can_exchange(context, explanation, time_left):
         return explanation
     limited_context, last_step = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
-    sites = explanation.steps[0].fitted.hypothesis.claims[-1].sites
+    sites, largest_cost = explanation.steps[0].fitted.hypothesis.claims[-1].sites, last_step.fitted.cost
 
     def compare_relatives() -> tuple[Explanation, tuple[FittedCandidate, ...]]:
         """Compare the related effects in place of the first: as `compare_replacements` of `_exchange_first`."""
         base = _omit_effect(limited_context, last_step, 0).fitted
         evidence = gather_evidence(limited_context.measure, limited_context.tuning, base)[0]
-        rivals, largest_cost = explanation.rounds[0][1:], last_step.fitted.cost
-        fits = combine_known_fits(context, base, rivals, related_effects, sites, largest_cost)
+        fits = combine_known_fits(context, base, explanation.rounds[0][1:], related_effects, sites, largest_cost)
         known_effects = [fitted.hypothesis.claims[-1].effect for fitted in fits]
         others = [effect for effect in related_effects if effect not in known_effects]
         try:
             fits += find_first_fits(limited_context, others, base, evidence, _make_exchange_step(progress), sites)
             fits = sorted((fit for fit in fits if fit.cost < largest_cost), key=lambda fit: fit.cost)
-            candidates = compare_plausible_fits(limited_context, base, fits, evidence)
+            initial, candidates = explanation, compare_plausible_fits(limited_context, base, fits, evidence)
         except OutOfTimeError:
+            initial = replace(explanation, ended_early=True)
             candidates = select_plausible(context, base, [context.score_fit(fitted) for fitted in fits], evidence)
         current_candidate = _move_first_to_end(limited_context, last_step)
         ranked_candidates = move_preferred_first([*candidates, current_candidate])
         is_kept = ranked_candidates[0] is current_candidate
-        return explanation if is_kept else remove_effect(context, explanation, 0), ranked_candidates
+        return initial if is_kept else remove_effect(context, initial, 0), ranked_candidates
 
     return _exchange_first(context, explanation, compare_relatives) or explanation
 

@@ -4,7 +4,7 @@ Main function: `simulate_mechanism`. Variants: `simulate_response` without the m
 `simulate_windows` with restarts from given states, for multiple shooting; `simulate_states_before` for these states.
 Sizes: n samples, m driven axes, p response channels; c coordinates of the model, k instants."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
 
@@ -25,10 +25,14 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 KEPT_BYTES = 2**27
-"""Largest size (bytes) of all motions that are kept for further simulations (`_recall_rows`). Chosen: some forty
+"""Largest size (bytes) of all motions that a process keeps for further simulations (`_recall_rows`). Chosen: some forty
 motions of three axes over a minute at 1 kHz, as many as the derivatives by the parameters of a backlash need."""
-_kept_rows: dict[tuple[object, ...], tuple[FloatArray, FloatArray]] = {}
-"""Results of `_simulate_rows` by all that determines them, the last used at the end."""
+KEPT_MOTIONS = 512
+"""Largest number of them: the sum of many thousand sizes would take longer than the simulation of a short motion."""
+_Rows = tuple[FloatArray, FloatArray]
+"""The two arrays of `simulate_bodies`."""
+_kept_rows: dict[tuple[object, ...], _Rows] = {}
+"""Results of `simulate_bodies` by all that determines them (`_list_causes`), the last used at the end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +127,8 @@ def simulate_states_before(
     """Simulate, from rest, the states (k, 2 c) just before the samples `sample_indices` (k,): positions, then
     velocities, of the model's own c coordinates; coordinates that effects add are left out. sampling: as in
     `simulate_windows`."""
-    bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
+    bodies = build_bodies(model, effects)
+    actuator_force, steps = _drive_bodies(bodies, model, commands, sampling, effects)
     states = simulate_states(bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), sample_indices)
     structure_coordinates, model_coordinates = bodies.structure.coordinates, model.coordinates
     return np.hstack(
@@ -131,22 +136,21 @@ def simulate_states_before(
     )
 
 
-def _prepare_simulation(
-    model: MechanicalModel, commands: FloatArray, sampling: tuple[float, Hold], effects: Sequence[PlacedEffect]
-) -> tuple[Bodies, ActuatorForce, int]:
-    """Prepare the bodies, the actuator force that drives them, and the number of integration steps per sample: the most
-    that a motion-dependent effect asks for, else `STEPS` where the force changes between samples, else 1."""
-    bodies, (rate_hz, hold) = build_bodies(model, effects), sampling
+def _drive_bodies(
+    bodies: Bodies,
+    model: MechanicalModel,
+    commands: FloatArray,
+    sampling: tuple[float, Hold],
+    effects: Sequence[PlacedEffect],
+) -> tuple[ActuatorForce, int]:
+    """Compute the actuator force that drives the bodies, and the number of integration steps per sample: the most that
+    a motion-dependent effect asks for, else `STEPS` where the force changes between samples, else 1."""
+    rate_hz, hold = sampling
     changes_between_samples = has_intersample_changes(model, effects, hold)
     steps = max((action.steps for action in bodies.actions), default=STEPS if changes_between_samples else 1)
     command_steps = steps if changes_between_samples else 1
-    return (
-        bodies,
-        drive_actuators(
-            model, subdivide_commands(commands, command_steps, hold), 1 / (rate_hz * command_steps), effects
-        ),
-        steps,
-    )
+    held_commands = subdivide_commands(commands, command_steps, hold)
+    return drive_actuators(model, held_commands, 1 / (rate_hz * command_steps), effects), steps
 
 
 def _simulate_motion(
@@ -160,9 +164,20 @@ def _simulate_motion(
     """Simulate the motion, with the true response before the sensor. with_axes: whether to output the driven axes,
     whose arrays are else (n, 0)."""
     bodies = build_bodies(model, effects)
-    # Only simulations with motion-dependent forces take longer than a comparison of what determines them.
-    simulate_rows = _recall_rows if bodies.actions else _simulate_rows
-    motion_rows, port_forces = simulate_rows(model, commands, sampling, effects, with_axes, restarts)
+
+    def simulate_rows() -> _Rows:
+        """Simulate the two arrays of `simulate_bodies`, without the sensor."""
+        actuator_force, steps = _drive_bodies(bodies, model, commands, sampling, effects)
+        step_s = 1 / (sampling[0] * steps)
+        return simulate_bodies(bodies, actuator_force, (len(commands), steps), step_s, with_axes, restarts)
+
+    # Only forces that depend on the motion take longer than a comparison of what determines it, and actions with
+    # recorded conditions are made anew for each simulation.
+    if bodies.actions and not any(placed.effect.with_conditions for placed in effects):
+        causes = _list_causes(model, commands, sampling, effects, with_axes, restarts)
+        motion_rows, port_forces = _recall_rows(causes, simulate_rows)
+    else:
+        motion_rows, port_forces = simulate_rows()
     axis_count, output_count, port_count = (
         bodies.axes if with_axes else 0,
         bodies.structure.outputs,
@@ -178,49 +193,38 @@ def _simulate_motion(
     )
 
 
-def _simulate_rows(
+def _list_causes(
     model: MechanicalModel,
     commands: FloatArray,
     sampling: tuple[float, Hold],
     effects: Sequence[PlacedEffect],
     with_axes: bool,
     restarts: Restarts | None,
-) -> tuple[FloatArray, FloatArray]:
-    """Simulate the two arrays of `simulate_bodies`, without the sensor."""
-    bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
-    return simulate_bodies(
-        bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), with_axes, restarts
-    )
-
-
-def _recall_rows(
-    model: MechanicalModel,
-    commands: FloatArray,
-    sampling: tuple[float, Hold],
-    effects: Sequence[PlacedEffect],
-    with_axes: bool,
-    restarts: Restarts | None,
-) -> tuple[FloatArray, FloatArray]:
-    """Return copies of what `_simulate_rows` returned for the same motion, or simulate it: hypotheses that differ in
-    the effects of the sensor alone have the same motion. At most `KEPT_BYTES` are kept."""
+) -> tuple[object, ...]:
+    """List all that determines a motion, in a form that can be compared; effects of the sensor do not."""
     matrices = (model.mass, model.damping, model.stiffness, model.input, model.output)
     samples = np.asarray(commands)
-    causes = (
+    return (
         *((matrix.shape, matrix.tobytes()) for matrix in matrices),
         *(samples.shape, samples.dtype, blake2b(samples.tobytes()).digest()),
         *(model.quantity, model.actuator, sampling, with_axes),
         None if restarts is None else (restarts.sample_indices.tobytes(), restarts.states.tobytes()),
         tuple(
-            (placed.effect.action, placed.sites, tuple(placed.values.items()))
+            (placed.effect.action, tuple(placed.sites), tuple(placed.values.items()))
             for placed in effects
             if not isinstance(placed.effect.action, OnResponse)
         ),
     )
-    rows = _kept_rows.pop(causes, None) or _simulate_rows(model, commands, sampling, effects, with_axes, restarts)
+
+
+def _recall_rows(causes: tuple[object, ...], simulate_rows: Callable[[], _Rows]) -> _Rows:
+    """Return copies of what `simulate_rows` returned under the same causes, or call it: hypotheses that differ in the
+    effects of the sensor alone have the same motion. At most `KEPT_MOTIONS` are kept, of at most `KEPT_BYTES`."""
+    rows = _kept_rows.pop(causes, None) or simulate_rows()
     _kept_rows[causes] = rows
-    # Copies of keys and values, and a default, because another thread may simulate meanwhile.
-    while sum(array.nbytes for kept in tuple(_kept_rows.values()) for array in kept) > KEPT_BYTES:
-        _kept_rows.pop(tuple(_kept_rows)[0], None)
+    # Copies of keys and values, and a default, because another thread may simulate meanwhile, and remove the last.
+    while len(_kept_rows) > KEPT_MOTIONS or sum(a.nbytes + b.nbytes for a, b in [*_kept_rows.values()]) > KEPT_BYTES:
+        _kept_rows.pop(next(iter(tuple(_kept_rows)), ()), None)
     return rows[0].copy(), rows[1].copy()
 
 

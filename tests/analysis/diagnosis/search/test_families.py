@@ -1,5 +1,7 @@
 """What can stand beside what."""
 
+from dataclasses import replace
+
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
@@ -84,5 +86,8 @@ def test_a_relative_that_was_fitted_before_the_second_effect_replaces_the_first_
         "asymmetric_friction",
     ]
     assert found.after.score.mean_log_error < explanation.after.score.mean_log_error
+    assert found.ended_early  # a better fit was not searched for
     # Without time to begin, or without fits from before, it stays.
     assert exchange_first_for_relatives(context, explanation, CATALOGUE, print, CountedBudget(0)) is explanation
+    without_fits = replace(explanation, rounds=(explanation.rounds[0][:1], explanation.rounds[1]))
+    assert exchange_first_for_relatives(context, without_fits, CATALOGUE, print, CountedBudget(1)) is without_fits

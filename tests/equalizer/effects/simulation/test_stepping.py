@@ -281,9 +281,17 @@ def test_a_motion_under_forces_is_simulated_once_for_all_effects_of_the_sensor(m
     assert len(simulated) == 3
 
 
-def test_kept_motions_have_a_limited_size(monkeypatch):
+@pytest.mark.parametrize(("most_bytes", "most", "kept"), [(5, 9, 2), (9, 2, 2), (9, 9, 3), (0, 9, 0)])
+def test_kept_motions_are_limited_in_size_and_number(monkeypatch, most_bytes, most, kept):
     monkeypatch.setattr(simulator, "_kept_rows", {})
-    monkeypatch.setattr(simulator, "KEPT_BYTES", 5 * SAMPLES * 8)  # a motion has two rows of `SAMPLES`
-    for level in (0.1, 0.2, 0.3):
-        simulate_response(springs(1.0), np.ones((SAMPLES, 1)), RATE_HZ, placed((*STIFF[:2], {"level": level})))
-    assert [causes[-1][0][-1] for causes in simulator._kept_rows] == [(("level", 0.2),), (("level", 0.3),)]
+    monkeypatch.setattr(simulator, "KEPT_BYTES", most_bytes * SAMPLES * 8)  # a motion has two rows of `SAMPLES`
+    monkeypatch.setattr(simulator, "KEPT_MOTIONS", most)
+    effects = [placed((STIFF[0], [0], {"level": level})) for level in (0.1, 0.2, 0.3)]
+    for effect in effects:
+        simulate_response(springs(1.0), np.ones((SAMPLES, 1)), RATE_HZ, effect)
+    last_values = [causes[-1][0][-1] for causes in simulator._kept_rows]
+    assert last_values == [(("level", 0.1),), (("level", 0.2),), (("level", 0.3),)][3 - kept :]
+    # The actions of effects with recorded conditions are others in each simulation.
+    of_conditions = replace(effects[0][0].effect, with_conditions=lambda samples, rate_hz: None)
+    simulate_response(springs(1.0), np.ones((SAMPLES, 1)), RATE_HZ, [replace(effects[0][0], effect=of_conditions)])
+    assert [causes[-1][0][-1] for causes in simulator._kept_rows] == last_values
