@@ -263,9 +263,9 @@ def _assemble(
         diagnosis = add_balances_with_given_model(findings.diagnosis, balances, unconfirmed, channels)
     compute_maps = partial(compute_state_maps, diagnosis, balances, findings.evidence, recordings[0])
     maps: tuple[StateMaps, ...] = settings.guard.run("the map of states", "its calculation", compute_maps, ())
+    part_remarks = _compare_parts(settings, diagnosis, balances, channels)
     guard_remarks = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear_remarks = describe_linear_terms(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
-    part_remarks = _compare_parts(settings, diagnosis, balances, channels)
     remarks = (*guard_remarks, *part_remarks, *fitting.chosen.remarks, *result.remarks, *linear_remarks)
     errors_by_balance = collect_balance_errors(diagnosis, balances, channels)
     named_effects = {effect.effect for effect in diagnosis.effects}

@@ -139,34 +139,41 @@ def judge_special_cases(balances: Sequence[Balance], claims: Sequence[Claim]) ->
 
 def _judge_special_cases_of_axis(balances: Sequence[Balance], axis: int, named_effects: set[str]) -> Balance:
     """Judge one balance again, as `judge_special_cases`. named_effects: names of the effects on this axis."""
-    balance, special_indices, rivals = balances[axis], {}, {}
-    for judged_law in balance.laws:
+    balance, special_indices = balances[axis], {}
+    for judged_law in balance.named:
         special_case = find_special_case(balances, [(axis, law) for law in balance.laws], (axis, judged_law))
         is_replaced = judged_law.has_column and judged_law.simulated_as not in named_effects
         if is_replaced and special_case is not None and special_case[1].law.effect in named_effects:
             special_indices[judged_law.law_index] = special_case[1].law_index
-            rivals[special_case[1].law_index] = judged_law
     if not special_indices:
         return balance
     regression = balance.search.regression
-    indices = tuple(special_indices.get(index, index) for index in balance.chosen.laws)
+    indices = tuple(dict.fromkeys(special_indices.get(index, index) for index in balance.chosen.laws))
     chosen = Structure(indices, regression.cross_validate(regression.select_columns(indices)))
     judged = judge_structure(balance.search, chosen)
-    command_laws = tuple(law for law in balance.laws if not law.has_column)
-    laws = tuple(_take_rivals(law, rivals.get(law.law_index)) for law in judged.laws)
-    return replace(judged, laws=(*command_laws, *laws))
-
-
-def _take_rivals(special_case: JudgedLaw, replaced_law: JudgedLaw | None) -> JudgedLaw:
-    """Give a special case the rivals and the probability of the law that it replaced, which becomes a rival itself;
-    unchanged without one."""
-    if replaced_law is None:
-        return special_case
-    rivals = (replaced_law.law.effect, *replaced_law.equivalents)
+    command_laws, further_command_laws = (
+        tuple(law for law in laws if not law.has_column) for laws in (balance.laws, balance.further_laws)
+    )
+    earlier_laws = {special_indices.get(law.law_index, law.law_index): law for law in balance.laws}
     return replace(
-        special_case,
-        equivalents=tuple(effect for effect in rivals if effect != special_case.law.effect),
-        probability=replaced_law.probability,
+        judged,
+        laws=(*command_laws, *(_keep_judgement(law, earlier_laws[law.law_index]) for law in judged.laws)),
+        further_laws=tuple(sorted((*judged.further_laws, *further_command_laws), key=lambda law: -law.gain)),
+        linear_error=balance.linear_error,
+    )
+
+
+def _keep_judgement(law: JudgedLaw, earlier: JudgedLaw) -> JudgedLaw:
+    """Keep the reason not to name a law. A special case gets the name, the rivals and the probability of the earlier
+    law, which it replaced and which becomes a rival itself."""
+    if law.law_index == earlier.law_index:
+        return replace(law, objection=earlier.objection)
+    rivals = (earlier.law.effect, *earlier.equivalents)
+    return replace(
+        law,
+        objection=earlier.objection,
+        equivalents=tuple(effect for effect in rivals if effect != law.law.effect),
+        probability=earlier.probability,
     )
 
 

@@ -52,7 +52,7 @@ class TriedStructure:
     error: float | None
     """Relative error (`StructureFit.error`), cross-validated or held-out; None where it was not fitted."""
     refusal: str
-    """Why it was not fitted, or, for two modes, not preferred to mass-spring; else empty."""
+    """Why it was not fitted, or, for a fit to spectra, not preferred to one by force balance; else empty."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
@@ -213,10 +213,15 @@ def _fit_structures(
 def _compare_with_spectra(
     choice: ChosenStructure, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> ChosenStructure:
-    """Compare a structure chosen by force balance with one of two modes (without a mode that lowers the error: with
-    mass, damper and spring) fitted to spectra, which noise of a differentiated position does not bias. It is chosen
-    where its error in a free simulation of held-out samples (of the fitted ones where none are) is smaller by more than
-    `MODES_GAIN`."""
+    """Compare a structure chosen by force balance with a fit to spectra: mass-spring with two modes; another structure
+    whose error in a free simulation is not below the signal itself, as where noise of a differentiated position biases
+    it, with two modes or, without a mode that lowers the error, with mass, damper and spring. The fit to spectra is
+    chosen where its error in a free simulation of held-out samples (of the fitted ones where none are) is smaller by
+    more than `MODES_GAIN`."""
+    if choice.fit.kind != "mass-spring":
+        simulation_errors = _compute_simulation_errors((choice.fit.model,), recordings)
+        if simulation_errors is None or simulation_errors[0] < 1:
+            return choice
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
         reason = "it is fitted to spectra, which a controller or an imposed motion biases"
         return _append_trial(choice, TriedStructure("two-mode", None, reason))

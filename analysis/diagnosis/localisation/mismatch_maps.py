@@ -104,7 +104,7 @@ def summarise_worst_channel(measure: ErrorMeasure, score: FitScore, fitted: Fitt
         Mismatch(
             channel_names[worst_channel],
             command_names,
-            (0.0, float(f"{_find_compared_band_end_hz(measure):.4g}")),
+            (0.0, _find_compared_band_end_hz(measure)),
             None,
             None,
             error_share,
@@ -148,10 +148,11 @@ def compute_cells(
     learned: ModelErrorFloor | None = None,
     held_out: bool = False,
 ) -> Cells:
-    """Compute the cells of all records for one fit, of bands that are compared over at least half an octave. held_out:
-    only from the samples to choose by (to which `confirm_laws` fits, too) and to test. learned: mismatch of clean
-    recordings."""
+    """Compute the cells of all records for one fit. Where forces are compared, only of bands that their filter passes
+    over at least half an octave. held_out: only from the samples to choose by (to which `confirm_laws` fits, too) and
+    to test. learned: mismatch of clean recordings."""
     margin = Margin(learned=learned or ModelErrorFloor())
+    highest_low_hz = measure.band_hz / np.sqrt(2.0) if isinstance(measure, PredictedForce) else np.inf
     cells: list[MismatchCell] = []
     for record_index, (record, residuals, floor) in enumerate(
         zip(measure.records, fitted.residuals, floors, strict=True)
@@ -163,15 +164,15 @@ def compute_cells(
         record_cells = compute_mismatch_cells(
             record.recording, Prediction(prediction[:, :response_count], position), floor, used_samples, margin
         )
-        highest_low_hz = _find_compared_band_end_hz(measure) / np.sqrt(2.0)
         cells += [replace(cell, part=record_index) for cell in record_cells if cell.band_hz[0] < highest_low_hz]
     return tuple(cells)
 
 
 def _find_compared_band_end_hz(measure: ErrorMeasure) -> float:
-    """Find the upper end in Hz of the band in which the measure compares: of the forces' filter, else half the rate."""
+    """Find the upper end in Hz of the band in which the measure compares: of the forces' filter (to four digits),
+    else half the rate."""
     half_rate_hz = measure.records[0].recording.sample_rate_hz / 2
-    return min(measure.band_hz, half_rate_hz) if isinstance(measure, PredictedForce) else half_rate_hz
+    return min(float(f"{measure.band_hz:.4g}"), half_rate_hz) if isinstance(measure, PredictedForce) else half_rate_hz
 
 
 MAX_NEIGHBOUR_RATIO = 2.1

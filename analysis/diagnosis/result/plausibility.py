@@ -5,6 +5,7 @@ contains the value without the effect, negative damping or stiffness of the impr
 and a law of the force balance whose strength differs between the parts of the recordings.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.diagnosis.effect_words import get_noun
+from analysis.diagnosis.limits import STILL_SHARE
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.unit_wording import format_error, format_value
 from analysis.wording import conjoin
@@ -24,6 +26,7 @@ from equalizer.signals.signal import FloatArray
 if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
     from analysis.diagnosis.balance.judged_law import JudgedLaw
+    from analysis.diagnosis.balance.regression import Regression
 
 _BOUND_TOLERANCE = 1e-3
 """Relative distance from a bound within which a parameter counts as at that bound. Chosen."""
@@ -113,34 +116,59 @@ def describe_changed_strengths(
 
 
 def _compare_parts(effect: NamedEffect, judged_law: "JudgedLaw", balance: "Balance") -> Iterator[str]:
-    """Compare the strengths of a law of one column, fitted to each part (motion) that has samples to fit and to test: a
+    """Compare the strengths of a law of one column, fitted to each part (motion) in which it acts (`_list_parts`): a
     sentence where separate values reduce the error of the held-out samples significantly."""
     from analysis.diagnosis.balance.structures import Structure, improves_significantly
 
     regression, laws = balance.search.regression, balance.chosen.laws
-    main_parameter = EFFECTS_BY_NAME[effect.effect].main.name if effect.effect in EFFECTS_BY_NAME else ""
-    parts = sorted({block.motion_index for block in regression.fit} & {block.motion_index for block in regression.test})
-    column_range = regression.column_ranges[judged_law.law_index] if judged_law.law_index in laws else slice(0)
-    if main_parameter not in effect.parameters or len(parts) < 2 or column_range.stop - column_range.start != 1:
+    if judged_law.law_index not in laws:  # a law of the command has no column
         return
-    columns = regression.select_columns(laws)
+    column_range, columns = regression.column_ranges[judged_law.law_index], regression.select_columns(laws)
+    parts = _list_parts(regression, column_range.start)
+    if column_range.stop - column_range.start != 1 or len(parts) < 2:
+        return
+    strength = _find_strength(effect, judged_law, regression)
     common_errors = regression.compute_test_errors(columns)
     common_weight = float(regression.fit_weights(columns)[columns.index(column_range.start)])
     weights, errors = regression.fit_weight_by_motion(columns, column_range.start)
-    if common_weight and improves_significantly(Structure(laws, common_errors), Structure(laws, errors)):
-        estimate = effect.parameters[main_parameter]
+    if strength and common_weight and improves_significantly(Structure(laws, common_errors), Structure(laws, errors)):
+        estimate = effect.parameters[strength]
         values = [estimate.value * float(weights[part]) / common_weight for part in parts]
         ends = f"between {format_value(min(values), estimate.unit)} and {format_value(max(values), estimate.unit)}"
         listed = conjoin([format_value(value, estimate.unit) for value in values])
         power = sum(block.centred_power for block in regression.test)
         before, after = (format_error(float(np.sqrt(e.sum() / power))) for e in (common_errors, errors))
-        name = f"{main_parameter.replace('_', ' ')} of {get_noun(effect.effect)}"
+        name = f"{strength.replace('_', ' ')} of {get_noun(effect.effect)}"
         yield (
-            f"Fitted to each of the {len(parts)} parts alone, the {name} is "
+            f"Fitted separately to each of the {len(parts)} parts, the {name} is "
             f"{listed if len(parts) <= _MOST_LISTED_PARTS else ends}, and the error of the force balance falls from "
             f"{before} to {after}: something that was not recorded changed between the parts, or the law depends on "
             "the motion in another way."
         )
+
+
+def _list_parts(regression: "Regression", column: int) -> list[int]:
+    """List the parts (indices of motions) with samples to fit and to test in which a law's column acts: its mean square
+    over the samples to fit is above `STILL_SHARE` of that in the part where it is largest."""
+    power: dict[int, float] = {}
+    for part in {block.motion_index for block in regression.test}:
+        blocks = [block for block in regression.fit if block.motion_index == part]
+        if blocks:
+            power[part] = sum(float(b.gram[column, column]) for b in blocks) / sum(len(b.rows) for b in blocks)
+    return sorted(part for part, part_power in power.items() if part_power > STILL_SHARE * max(power.values()))
+
+
+def _find_strength(effect: NamedEffect, judged_law: "JudgedLaw", regression: "Regression") -> str:
+    """Find the effect's first parameter that is proportional to the weight of the law's single column, as the stiffness
+    of an end stop is, but not its position; empty without one, and for a formula."""
+    if judged_law.formula is not None:
+        return ""
+    law, columns = judged_law.law, regression.select_columns((judged_law.law_index,))
+    weights = regression.fit_weights(columns)
+    mass = float(weights[regression.base_terms.driven_channel]) if regression.mass is None else regression.mass
+    whole, half = (law.convert_weights(factor * weights[-1:], law.numbers, mass) or {} for factor in (1.0, 0.5))
+    proportional = (name for name, value in whole.items() if value and math.isclose(half.get(name, value), value / 2))
+    return next((name for name in proportional if name in effect.parameters), "")
 
 
 def _compute_extreme_eigenvalues(matrix: FloatArray) -> tuple[float, float]:

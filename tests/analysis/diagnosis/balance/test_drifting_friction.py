@@ -2,12 +2,16 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.judged_law import NO_COLUMN
+from analysis.diagnosis.balance.laws.law import Scales
+from analysis.diagnosis.balance.laws.motion_laws import make_dynamic_laws, make_stiffness_laws
 from analysis.diagnosis.document import Estimate, NamedEffect
-from analysis.diagnosis.result.plausibility import describe_changed_strengths
+from analysis.diagnosis.result.plausibility import _find_strength, _list_parts, describe_changed_strengths
 
 SEED, LEVEL, RATE_HZ = 3, 2.0, 250.0
 
@@ -59,3 +63,46 @@ def test_friction_that_differs_between_parts_is_told_part_by_part(axis_module, f
     else:
         found = [float(number) for number in re.findall(r"([\d.]+) N", sentences[0])]
         np.testing.assert_allclose(found, levels, rtol=0.05)
+
+    # A law of the command has no column, and no strength in the force balance.
+    of_command = replace(balances[0], laws=(replace(law, law_index=NO_COLUMN),))
+    assert describe_changed_strengths((effect,), (of_command,), ("fx",)) == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "strength"),
+    [
+        ("end_stop", "stiffness"),
+        ("backlash", "contact_stiffness"),
+        ("extra_mode", "mass"),
+        ("hardening_stiffness", "k3"),
+        ("pose_dependent_inertia", "per_m"),
+    ],
+)
+def test_the_strength_of_a_law_is_the_parameter_that_grows_with_its_force(effect, strength):
+    """Not where a stop stands, how wide a gap is or how fast a mode is, which a fitted weight does not give."""
+    scales = Scales(1.0, 0.1, -0.04, 0.06, 10.0, 20.0, turns_freely=False, rotational=False)
+    law = next(e for make in (make_stiffness_laws, make_dynamic_laws) for e in make(0, scales) if e.effect == effect)
+    weights = np.array([0.4, 6.0, 900.0, 0.0, 2.0])
+    regression = SimpleNamespace(
+        mass=None,
+        base_terms=SimpleNamespace(driven_channel=0),
+        select_columns=lambda laws: list(range(len(weights))),
+        fit_weights=lambda columns: weights,
+    )
+    judged = SimpleNamespace(law_index=7, law=law, formula=None)
+    parameters = dict.fromkeys(law.convert_weights(weights[-1:], law.numbers, 0.4), Estimate(1.0, "1"))
+    named = NamedEffect(effect, "mechanism", None, 0.9, 0.9, parameters)
+    assert _find_strength(named, judged, regression) == strength
+    assert _find_strength(named, SimpleNamespace(law=law, formula="f"), regression) == ""
+
+
+def test_parts_in_which_a_law_hardly_acts_have_no_strength():
+    """As where an end stop is not reached: a weight fitted there would be that of noise."""
+
+    def block(part, power):
+        return SimpleNamespace(motion_index=part, gram=np.diag([1.0, power]), rows=np.arange(10))
+
+    fit = [block(part, power) for part, power in enumerate((5.0, 0.06, 0.04, 0.0, 7.0)) for _ in range(part + 1)]
+    test = [block(part, 1.0) for part in (0, 1, 2, 3, 5)]
+    assert _list_parts(SimpleNamespace(fit=fit, test=test), 1) == [0, 1]

@@ -8,10 +8,12 @@ import pytest
 from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.diagnose_values import diagnose_values
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.first_model.choose_structure import choose_structure
 from analysis.diagnosis.first_model.free_motion import convert_free_motion, is_undriven_motion
 from analysis.diagnosis.first_model.model_structures import StructureFitError
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.time_budget import grant_time
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -114,6 +116,17 @@ def test_dry_friction_is_named_from_a_decay(seed):
     assert any("The motion is free" in remark for remark in found.remarks)
     assert not any("was imposed" in remark or "lower bound" in remark for remark in found.remarks)
     assert found.improved.mass == pytest.approx(np.eye(1))
+
+
+def test_a_crash_of_the_comparison_of_parts_is_told(monkeypatch):
+    def crash(*arguments):
+        raise ValueError("operands could not be broadcast together")
+
+    monkeypatch.setattr("analysis.diagnosis.result.plausibility.describe_changed_strengths", crash)
+    settings = DiagnosisSettings(guard=Guard(enabled=True))
+    found = diagnose_values(make_recording(simulate_decay(friction_acceleration, 1.0, 8, 1)), settings=settings)
+    assert "coulomb_friction" in effect_names(found)
+    assert any(remark.startswith("The comparison of parts was left out") for remark in found.remarks)
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,13 @@ def test_no_mismatch_is_listed_above_the_band_in_which_forces_are_compared(monke
     measure = PredictedForce((record,), (), np.ones(1), np.ones(1), band_hz)
     cells = compute_cells(measure, SimpleNamespace(residuals=(np.zeros((9, 1)),)), (None,))
     assert [cell.band_hz[0] for cell in cells] == listed_hz
+    assert mismatch_maps._find_compared_band_end_hz(measure) == band_hz
+    # Motions are compared up to half the sample rate, here 150 Hz.
+    recording.sample_rate_hz = 300.0
+    motion_measure = SimpleNamespace(records=(record,), unit=np.ones(1))
+    cells = compute_cells(motion_measure, SimpleNamespace(residuals=(np.zeros((9, 1)),)), (None,))
+    assert [cell.band_hz[0] for cell in cells] == [16.0, 32.0, 64.0, 128.0]
+    assert mismatch_maps._find_compared_band_end_hz(motion_measure) == 150.0
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.result.assemble_findings import _collect_remarks, _describe_held_out_rest
+from analysis.diagnosis.result.assemble_findings import _collect_remarks, _describe_rest
 from analysis.diagnosis.result.black_box import _normalise_error
 from analysis.diagnosis.result.error_table import _compute_errors, find_resting_channels, is_held_out_still
 from equalizer.effects.catalogue import CATALOGUE
@@ -68,7 +68,7 @@ def test_a_channel_that_rests_where_another_moves_does_not_count_in_the_held_out
     errors = _compute_errors(measure, SimpleNamespace(before=found, retuned=found, after=found), ("test",))
     assert errors.retuned == pytest.approx(0.1 / records[0].measured[records[0].test, 1].std(), rel=1e-6)
     assert _normalise_error(measure, np.full((int(records[0].test.sum()), 2), 2.0)) == pytest.approx(errors.retuned)
-    assert _describe_held_out_rest(measure, ("speed0", "speed1")).startswith(
+    assert _describe_rest(measure, ("speed0", "speed1")).startswith(
         "The held-out data contain no motion of speed0, so the error on them is that of the other channels."
     )
 

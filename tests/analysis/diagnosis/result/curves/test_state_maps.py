@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judge_laws import judge_laws, judge_structure
+from analysis.diagnosis.balance.judged_law import NO_COLUMN
 from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.balance.structures import Structure, search_structures
 from analysis.diagnosis.confirm.laws_for_simulation import judge_special_cases
@@ -122,6 +123,34 @@ def test_what_a_simulation_prefers_to_a_law_of_the_balance_has_its_errors_and_it
     (told,) = add_balances_with_fitted_model(named, (kept,), recording.command.channels).effects
     assert told.share > 0.5
     assert [law.law.effect for law in judge_special_cases((bent,), [])[0].laws] == ["presliding_hysteresis"]
+
+
+def test_what_else_was_judged_is_kept_where_a_special_case_takes_the_place_of_a_law(friction_maps):
+    """Reasons not to name other laws, laws of the command, and the error of the linear balance before them."""
+    search = friction_maps[0].search
+    effects = [law.effect for law in search.regression.laws]
+    pair = (effects.index("presliding_hysteresis"), effects.index("hardening_stiffness"))
+    errors = search.regression.cross_validate(search.regression.select_columns(pair))
+    bent = judge_structure(search, Structure(pair, errors))
+    told = {law.law.effect: law for law in bent.laws}
+    doubted = replace(told["hardening_stiffness"], objection="in doubt")
+    of_command = replace(told["hardening_stiffness"], law_index=NO_COLUMN, gain=0.3, objection="small")
+    given = replace(
+        bent,
+        laws=(replace(told["presliding_hysteresis"], objection=""), doubted),
+        further_laws=(of_command,),
+        linear_error=0.77,
+    )
+    claims = [Claim(EFFECTS["coulomb_friction"], "one", (0,))]
+    (kept,) = judge_special_cases((given,), claims)
+    assert {law.law.effect: law.objection for law in kept.laws} == {
+        "coulomb_friction": "", "hardening_stiffness": "in doubt",
+    }  # fmt: skip
+    assert [law for law in kept.further_laws if not law.has_column] == [of_command]
+    assert kept.linear_error == 0.77
+    # A law that is not named is not simulated, so that nothing was preferred to it.
+    unnamed = given.withdraw_names("in doubt")
+    assert judge_special_cases((unnamed,), claims)[0] is unnamed
 
 
 def test_states_and_loops_are_drawn_with_plain_units(friction_maps):
