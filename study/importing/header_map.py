@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from study.importing.arrays.array_groups import find_runs
+from study.importing.array_groups import find_runs
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import suggest_conversion
 from study.importing.arrays.read_arrays import (

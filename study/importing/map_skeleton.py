@@ -11,7 +11,7 @@ from itertools import takewhile
 from textwrap import wrap
 
 from protocols.document.dumping import format_toml_text
-from study.importing.arrays.array_groups import RunGroups, find_runs
+from study.importing.array_groups import RunGroups, find_runs
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import CELL_ENTRY_PREFIX, suggest_conversion
 from study.importing.arrays.read_arrays import Array, Arrays, find_unread_reason

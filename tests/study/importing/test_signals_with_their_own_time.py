@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from study.importing.arrays.array_groups import find_runs
+from study.importing.array_groups import find_runs
 from study.importing.arrays.read_arrays import read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import find_header_problems
