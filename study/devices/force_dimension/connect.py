@@ -86,7 +86,7 @@ def _open_in_time(library: Library, device_index: int) -> Handle:
     opened: Future[int] = Future()
 
     def open_device() -> None:
-        """Open the device, and close it again where nobody waits for it any more. The function of the thread."""
+        """Open the device, and close it again where the wait has ended. The function of the thread."""
         try:
             number = library.call("dhdOpenID", device_index)
         except BaseException as error:  # noqa: BLE001 - raised where it is awaited
