@@ -67,7 +67,7 @@ def estimate_local_noise(command: ComplexArray, response: ComplexArray) -> Float
 LEAST_EXCITED_AMPLITUDE = 1e-2
 """Amplitude of a line, relative to the strongest, above which it counts as excited. Heuristic."""
 MAX_TRANSIENT_LINES = 2000
-"""Largest number of lines of a segment with a transient; of more, every second, third, ... line is used. Chosen."""
+"""Largest number of lines of a segment with a transient; more are thinned (`thin_lines`). Chosen."""
 SMOOTHING_LINES = 9
 """Number of lines over which the noise power between periods and, with a transient, the excitation power are averaged.
 Chosen."""
@@ -152,11 +152,22 @@ def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] |
         shared_excited = [candidate.excited for candidate in segments if have_same_lines(segment, candidate)]
         excited = segment.excited if segment.transient else np.any(shared_excited, axis=0)
         chosen_lines = np.flatnonzero(excited & (segment.frequency_hz >= low_hz) & (segment.frequency_hz <= high_hz))
-        if segment.transient and len(chosen_lines) > MAX_TRANSIENT_LINES:
-            chosen_lines = chosen_lines[:: -(-len(chosen_lines) // MAX_TRANSIENT_LINES)]
+        if segment.transient:
+            command_power = np.sum(np.abs(segment.command[chosen_lines]) ** 2, axis=1)
+            chosen_lines = chosen_lines[thin_lines(command_power, MAX_TRANSIENT_LINES)]
         if len(chosen_lines):
             selected_segments.append(_select_lines(segment, chosen_lines))
     return tuple(selected_segments)
+
+
+def thin_lines(command_power: FloatArray, max_lines: int) -> npt.NDArray[np.int64]:
+    """Select at most `max_lines` of the lines: of every k consecutive ones the first with at least half of the largest
+    command power among them, so that the lines of a comb are kept, which a fixed stride could miss altogether.
+    command_power: (lines,). Returns their indices, in ascending order."""
+    stride = max(1, -(-len(command_power) // max_lines))
+    padded_power = np.append(command_power, np.zeros(-len(command_power) % stride)).reshape(-1, stride)
+    is_strong = padded_power >= padded_power.max(axis=1, keepdims=True) / 2
+    return np.asarray(np.arange(len(padded_power)) * stride + np.argmax(is_strong, axis=1))
 
 
 def have_same_lines(first: SegmentLines, second: SegmentLines) -> bool:

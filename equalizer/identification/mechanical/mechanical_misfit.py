@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.identification.frequency_response.noise_floor import smooth_over_lines
-from equalizer.identification.mechanical.mechanical_lines import SegmentLines, have_same_lines
+from equalizer.identification.mechanical.mechanical_lines import SegmentLines, have_same_lines, thin_lines
 from equalizer.identification.mechanical.mechanical_response import (
     PoleForm,
     compute_free_response,
@@ -126,9 +126,16 @@ class LineGroup:
         return self.select_lines(~self.held_out)
 
     def limit_lines(self, max_lines: int) -> "LineGroup":
-        """Limit the group to `max_lines` lines: every second, third, ... line, with held-out lines chosen anew."""
-        stride = -(-len(self.frequency_hz) // max_lines)
-        thinned_group = self.select_lines(np.arange(len(self.frequency_hz)) % stride == 0)
+        """Limit the group to `max_lines` lines (`thin_lines`), with held-out lines chosen anew."""
+        outputs = np.argmax(self.weight, axis=1)[:, None]
+        weights = np.take_along_axis(self.weight, outputs, axis=1)[:, 0]
+        weighted_power = np.sum(
+            np.abs(np.take_along_axis(self.root, outputs[:, :, None, None], axis=1)) ** 2, axis=(1, 2, 3)
+        )
+        command_power = weighted_power / np.where(weights > 0, weights, 1.0) ** 2
+        is_chosen = np.zeros(len(self.frequency_hz), dtype=np.bool_)
+        is_chosen[thin_lines(command_power, max_lines)] = True
+        thinned_group = self.select_lines(is_chosen)
         return replace(thinned_group, held_out=_select_held_out_lines(len(thinned_group.frequency_hz)))
 
     def select_lines(self, is_chosen: BoolArray) -> "LineGroup":

@@ -13,6 +13,7 @@ from equalizer.identification.mechanical.mechanical_lines import (
     have_same_lines,
     select_band,
     split_fit_and_test,
+    thin_lines,
 )
 from equalizer.identification.mechanical.mechanical_misfit import add_scatter_noise
 from equalizer.signals.recording import Segment
@@ -75,6 +76,16 @@ def test_as_many_lines_are_not_the_same_lines():
     assert not have_same_lines(*lines)
     for before, after in zip(lines, add_scatter_noise(lines), strict=True):
         np.testing.assert_array_equal(after.noise, before.noise)
+
+
+@pytest.mark.parametrize("first", [0, 1, 2, 3, 15])
+def test_thinned_lines_contain_those_of_a_comb(first):
+    power = np.full(1387, 1e-4)
+    power[first::16] = 1.0
+    chosen = thin_lines(power, 400)
+    assert len(chosen) == 347 and set(range(first, 1387, 16)) <= set(chosen.tolist())
+    np.testing.assert_array_equal(thin_lines(np.ones(1387), 400), np.arange(0, 1387, 4))
+    np.testing.assert_array_equal(thin_lines(power, 1387), np.arange(1387))
 
 
 @pytest.mark.parametrize("at_rest", [0.0, 9.81])
