@@ -127,12 +127,8 @@ class LineGroup:
 
     def limit_lines(self, max_lines: int) -> "LineGroup":
         """Limit the group to `max_lines` lines (`thin_lines`), with held-out lines chosen anew."""
-        outputs = np.argmax(self.weight, axis=1)[:, None]
-        weights = np.take_along_axis(self.weight, outputs, axis=1)[:, 0]
-        weighted_power = np.sum(
-            np.abs(np.take_along_axis(self.root, outputs[:, :, None, None], axis=1)) ** 2, axis=(1, 2, 3)
-        )
-        command_power = weighted_power / np.where(weights > 0, weights, 1.0) ** 2
+        weight_power = np.sum(self.weight**2, axis=1)
+        command_power = np.sum(np.abs(self.root) ** 2, axis=(1, 2, 3)) / np.maximum(weight_power, 1e-300)
         is_chosen = np.zeros(len(self.frequency_hz), dtype=np.bool_)
         is_chosen[thin_lines(command_power, max_lines)] = True
         thinned_group = self.select_lines(is_chosen)
