@@ -45,7 +45,7 @@ class Board:
         self.rate_hz, self.period_s, self.first_us = rate_hz, (1 + 1e-6 * drift_ppm) / rate_hz, first_us
         self.sent, self.on = 0, True
         self.spoil: Callable[[bytes], bytes] = lambda block: block
-        self._reset = 0.0
+        self._reset, self._started_s = 0.0, time.monotonic()
         self._thread = threading.Thread(target=self._send, daemon=True)
         self._thread.start()
 
@@ -53,17 +53,20 @@ class Board:
         """As if its button were pressed: number and time begin anew after a silence."""
         self._reset = silent_s
 
+    def taken_s(self, device_s: np.ndarray) -> np.ndarray:
+        """Host times (s) of samples by their times of this board's clock (s), as long as it was not reset."""
+        return self._started_s + (device_s - 1e-6 * self.first_us) * self.rate_hz * self.period_s
+
     def _send(self) -> None:
-        started_s = time.monotonic()
         while self.on:
             if self._reset:
                 time.sleep(self._reset)
                 self._reset, self.sent, self.first_us = 0.0, 0, 0
-                started_s = time.monotonic()
-            due = 1 + int((time.monotonic() - started_s) / self.period_s)
+                self._started_s = time.monotonic()
+            due = 1 + int((time.monotonic() - self._started_s) / self.period_s)
             if due > self.sent:
                 numbers = np.arange(self.sent, due)
-                taken_s = started_s + self.period_s * numbers
+                taken_s = self._started_s + self.period_s * numbers
                 wanted = np.tile(self.acceleration, (len(numbers), 1)) if self.signal is None else self.signal(taken_s)
                 raw = np.clip(32_768 + SCALE * wanted, 0, 65_535)
                 packets = encode_packets(numbers, self.first_us + 1e6 * numbers / self.rate_hz, raw)
