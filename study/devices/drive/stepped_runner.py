@@ -12,6 +12,7 @@ once more, so that a late write leaves no force on the device.
 import contextlib
 import math
 import threading
+import time
 from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 
@@ -254,9 +255,7 @@ class SteppedRunner:
         zero force could not be written in time, the rig is marked as gone and the fault is FORCE_LEFT."""
         is_zero_written = False
         try:
-            is_zero_written = (
-                self._zero_writer.run(ZERO_TIMEOUT_S) and not self.loop_state[WRITING]
-            )  # a write that still hangs may take effect after the zero
+            is_zero_written = self._write_last_zero()
         finally:
             self.force_off = is_zero_written
             if not is_zero_written:
@@ -264,6 +263,19 @@ class SteppedRunner:
                 self.failure = self.failure or TimeoutError("it took no zero force")
             self._governor.abandon(fault if is_zero_written else Fault.FORCE_LEFT)
             self.loop_state[DECIDING] = 0.0
+
+    def _write_last_zero(self) -> bool:
+        """Write zero force, and once more after a write of the loop that was in progress, which may take effect after
+        the first. Returns whether that ended within `ZERO_TIMEOUT_S`."""
+        deadline_s = time.monotonic() + ZERO_TIMEOUT_S
+        is_written = self._zero_writer.run(ZERO_TIMEOUT_S)
+        if not (is_written and self.loop_state[WRITING]):
+            return is_written
+        while self.loop_state[WRITING]:
+            if time.monotonic() > deadline_s:
+                return False
+            time.sleep(ZERO_TIMEOUT_S / 100)
+        return self._zero_writer.run(max(0.0, deadline_s - time.monotonic()))
 
     def _repeat_zero_force(self) -> None:
         """Write zero force again, and close the rig if that was requested: the caller stopped waiting while this thread

@@ -9,6 +9,7 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.devices.device import Fault
+from study.devices.drive.compiled_drive import WRITING
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.governor import govern
 from study.devices.governor.governor import Governor
@@ -111,6 +112,23 @@ def test_a_write_that_goes_through_late_is_taken_back(device, rigs, rig, hang):
     wait_until(lambda: rig.closed > closed)
     assert rig.written_n[late][0] == pytest.approx(2.9, abs=0.2)  # the late one
     assert not rig.last_n.any()
+
+
+def test_a_write_that_ends_while_zero_is_written_is_followed_by_a_zero(rigs, rig, hang):
+    governor = Governor(rig.info, rigs.SETTINGS)
+    runner = SteppedRunner(rig, governor, catches_up=False)
+    governor.begin_hold(rigs.push())
+    runner.run(20)
+    rig.before_writing = in_loop(hang.wait)
+    loop = threading.Thread(target=runner.run, args=(1,), name="haptic loop")
+    loop.start()
+    wait_until(lambda: runner.loop_state[WRITING])
+    threading.Timer(0.03, hang.set).start()
+    runner.give_up(TimeoutError("late"))  # as of a loop that was stopped in its write, and takes a moment to run again
+    loop.join()
+    assert governor.fault is Fault.LOST
+    assert runner.force_off and not rig.last_n.any()
+    runner.disconnect()
 
 
 def test_a_late_write_of_a_device_that_is_still_open_is_taken_back_too(device, rigs, rig, hang):
