@@ -1,15 +1,17 @@
-"""Find periodic segments in a recording that declares none: parts whose excitation repeats, up to rounding.
+"""Find periodic segments in a recording that declares none: stretches whose excitation repeats, up to rounding.
 
 The excitation is tested where it was recorded, else the command (`find_designed_command`); below, both are called
-command. A candidate period is the first high peak of its autocorrelation. It is accepted only where the command itself,
-sample by sample, repeats with it throughout the part; commands that were measured with noise, or repeat approximately,
-are not used. Without such a part, no segments are declared. Called by `prepare_recordings` and
-`study.importing.build_recording`."""
+command. A candidate period of a whole part is the first high peak of its autocorrelation. It is accepted only where the
+command itself, sample by sample, repeats with it throughout the part; else the part is searched for stretches that do,
+such as levels one after another, whose candidate periods are the distances to equal samples
+(`_find_repeating_stretches`). Commands that were measured with noise, or repeat approximately, are not used. Without
+such a stretch, no segments are declared. Called by `prepare_recordings` and `study.importing.build_recording`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import fftconvolve
 
 from analysis.diagnosis.data.observed_parts import MOST_PERIODS
 from analysis.diagnosis.noise.rounding import find_rounding_step
@@ -42,14 +44,17 @@ LARGEST_SAMPLE = 1e100
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:
     """Find the segments. Returns the recording with them, and a sentence about them; the recording unchanged and an
-    empty string where it has segments, or no part of its excitation repeats. Parts that do not repeat become segments,
-    too, without a period."""
+    empty string where it has segments, or no stretch of its excitation repeats. What does not repeat becomes segments,
+    too, without a period, but for short stretches between others and such with a constant excitation."""
     if recording.segments:
         return recording, ""
-    parts = find_parts(recording)
     designed_samples = find_designed_command(recording).samples
-    periods = [find_exact_period(designed_samples[start:stop]) for start, stop in parts]
-    if not any(periods):
+    stretches = [
+        (start + first, start + last, period)
+        for start, stop in find_parts(recording)
+        for first, last, period in _divide_part(designed_samples[start:stop])
+    ]
+    if not any(period for _, _, period in stretches):
         return recording, ""
     segments = tuple(
         Segment(
@@ -59,7 +64,7 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
             _compute_peak(recording.command, start, stop),
             period,
         )
-        for (start, stop), period in zip(parts, periods, strict=True)
+        for start, stop, period in stretches
     )
     return replace(recording, segments=segments), _describe_segments(segments)
 
@@ -84,12 +89,55 @@ def find_exact_period(command: FloatArray) -> int:
         or not _is_exact_repeat(command[period:], command[:-period])
     ):
         return 0
+    return _choose_declared_period(period, len(command))
+
+
+def _choose_declared_period(period: int, length: int) -> int:
+    """Choose the period to declare for `length` samples that repeat after `period`: see `find_exact_period`."""
     if period >= SHORTEST_DECLARED_PERIOD:
         return period
     # The largest odd multiple of which `MOST_PERIODS` and one for the transient fit into the part, else the period.
-    largest_multiple = len(command) // period // (MOST_PERIODS + 1)
+    largest_multiple = length // period // (MOST_PERIODS + 1)
     declared_period = period * max(1, largest_multiple - 1 + largest_multiple % 2)
     return declared_period if declared_period >= SHORTEST_DECLARED_PERIOD else 0
+
+
+def _divide_part(command: FloatArray) -> list[tuple[int, int, int]]:
+    """Divide a part, command (n, m), into stretches (start, stop, period), period 0 = not periodic: the whole part
+    where it repeats throughout or nowhere."""
+    n = len(command)
+    if period := find_exact_period(command):
+        return [(0, n, period)]
+    stretches = _find_repeating_stretches(command)
+    ends, starts = [0, *(stop for _, stop, _ in stretches)], [*(start for start, _, _ in stretches), n]
+    remainders = [
+        (start, stop, 0)
+        for start, stop in zip(ends, starts, strict=True)
+        if stop - start >= SHORTEST_DECLARED_PERIOD and np.ptp(command[start:stop], axis=0).any()
+    ]
+    covered, rest = (sum(stop - start for start, stop, _ in part) for part in (stretches, remainders))
+    return sorted(stretches + remainders) if covered > rest else [(0, n, 0)]  # fewer may repeat by chance
+
+
+def _find_repeating_stretches(command: FloatArray) -> list[tuple[int, int, int]]:
+    """Find stretches (start, stop, declared period) in which the command (n, m) repeats exactly, in order. From each
+    start, the distances at which the next `SHORTEST_DECLARED_PERIOD` samples recur are candidate periods."""
+    width = SHORTEST_DECLARED_PERIOD
+    if len(command) < FEWEST_PERIODS * width or not np.isfinite(command).all():
+        return []
+    tolerance, recurrences = _compute_tolerance(command), _Recurrences(command)
+    stretches: list[tuple[int, int, int]] = []
+    start = free_from = 0
+    while start + width <= len(command):
+        found = None
+        if (np.ptp(command[start : start + width], axis=0) > tolerance).any():
+            for period in recurrences.find(start, tolerance):
+                if found := _extend_stretch(command, (free_from, start), period, tolerance):
+                    break
+        if found and (declared_period := _choose_declared_period(period, found[1] - found[0])):
+            stretches.append((*found, declared_period))
+        start, free_from = (found[1], found[1]) if found else (start + width, free_from)
+    return stretches
 
 
 def find_period(command: FloatArray) -> int:
@@ -119,6 +167,62 @@ def find_period(command: FloatArray) -> int:
     # The maximum of the first run of consecutive lags that are high enough.
     last_high_lag = high_lags[0] + int(np.argmax(np.diff(np.append(high_lags, high_lags[-1] + 2)) > 1))
     return int(high_lags[0] + np.argmax(correlation[high_lags[0] : last_high_lag + 1]))
+
+
+def _compute_tolerance(command: FloatArray) -> FloatArray:
+    """Compute the largest difference between samples that count as equal, (m,), as `_is_exact_repeat` does."""
+    steps = np.array([find_rounding_step(column) for column in command.T])
+    is_fine = steps <= ROUNDED_TOLERANCE * np.std(command, axis=0)
+    return np.asarray(np.maximum(EXACT_TOLERANCE * np.abs(command).max(axis=0), np.where(is_fine, 1.5 * steps, 0.0)))
+
+
+def _extend_stretch(
+    command: FloatArray, bounds: tuple[int, int], period: int, tolerance: FloatArray
+) -> tuple[int, int] | None:
+    """Extend a repetition in both directions. bounds: first sample that is free, and a sample from which on the command
+    repeats. Returns (start, stop); None where it repeats too seldom."""
+    earliest, inside = bounds
+    differs = (np.abs(command[earliest + period :] - command[earliest:-period]) > tolerance).any(axis=1)
+    breaks = np.flatnonzero(differs) + earliest
+    after = int(np.searchsorted(breaks, inside))
+    start = int(breaks[after - 1]) + 1 if after else earliest
+    stop = (int(breaks[after]) if after < len(breaks) else len(command) - period) + period
+    is_repeat = stop - start >= FEWEST_PERIODS * period and _is_exact_repeat(
+        command[start + period : stop], command[start : stop - period]
+    )
+    return (start, stop) if is_repeat else None
+
+
+class _Recurrences:
+    """Places at which a window of `SHORTEST_DECLARED_PERIOD` samples of a command (n, m) recurs. Equal windows have
+    equal weighted sums; windows are compared by these sums, with fixed random weights, in logarithmic time."""
+
+    def __init__(self, command: FloatArray) -> None:
+        weights = np.random.default_rng(0).uniform(1.0, 2.0, (SHORTEST_DECLARED_PERIOD, command.shape[1]))
+        self._sums = fftconvolve(command, weights[::-1], mode="valid", axes=0).sum(axis=1)
+        self._weight = weights.sum(axis=0)
+        self._rounding = 1e-9 * float(np.abs(self._sums).max())  # of the Fourier transform, with a margin
+        self._order = np.argsort(self._sums)
+        self._sorted_sums = self._sums[self._order]
+
+    def find(self, start: int, tolerance: FloatArray) -> list[int]:
+        """Find the distances, rising, after which the samples from `start` on recur for a whole period at least.
+        tolerance: (m,), largest difference between equal samples."""
+        sums, width = self._sums, SHORTEST_DECLARED_PERIOD
+        largest_difference = float(self._weight @ tolerance) + self._rounding
+        low, high = np.searchsorted(
+            self._sorted_sums, [sums[start] - largest_difference, sums[start] + largest_difference]
+        )
+        places = self._order[low:high]
+        periods = np.sort(places[places >= start + SHORTEST_PERIOD]) - start
+        for offset in range(width, len(sums) - start, width):
+            is_compared = (periods > offset) & (start + periods + offset < len(sums))
+            if not is_compared.any():
+                break
+            compared_sums = sums[np.where(is_compared, start + periods + offset, 0)]
+            recurs = np.abs(sums[start + offset] - compared_sums) <= largest_difference
+            periods = periods[~is_compared | recurs]
+        return [int(period) for period in periods]
 
 
 def _compute_autocorrelation(samples: FloatArray) -> FloatArray:

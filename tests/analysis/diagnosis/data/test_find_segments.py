@@ -20,8 +20,8 @@ def make_recording(command, response=None, **meta):
     response = command if response is None else response
     return Recording(
         "rig",
-        Signal(command.reshape(count, -1), 1000.0, "force", "N", ("fx",)),
-        Signal(response.reshape(count, -1), 1000.0, "acceleration", "m/s^2", ("ax",)),
+        Signal(command.reshape(count, -1), 1000.0, "force", "N", ("fx", "fy")[: command.size // count]),
+        Signal(response.reshape(count, -1), 1000.0, "acceleration", "m/s^2", ("ax", "ay")[: response.size // count]),
         meta=meta,
     )
 
@@ -80,19 +80,43 @@ def _slow_sine():
         tile_noise(1000, 2.9),
         tile_noise(500, 8) + 1e-3 * np.random.default_rng(3).standard_normal(4000),
         tile_noise(500, 8) * np.linspace(1, 1.01, 4000),
-        np.concatenate([tile_noise(500, 7), tile_noise(500, 1, seed=4)]),
-        np.concatenate([np.zeros(250), tile_noise(500, 7)]),
+        np.concatenate([tile_noise(500, 3), np.random.default_rng(4).standard_normal(2000)]),
+        np.repeat(np.random.default_rng(0).integers(0, 2, 2000), 130).astype(float),
         np.where(np.arange(4000) == 1234, np.nan, tile_noise(500, 8)),
         _slow_sine(),
         np.ones(4000),
         np.sin(2 * np.pi * np.arange(900) / 30),
     ],
-    ids=["noise", "two", "measured", "growing", "another at the end", "rest first", "missing", "not whole", "constant",
+    ids=["noise", "two", "measured", "growing", "three among noise", "bits", "missing", "not whole", "constant",
          "short"],
 )  # fmt: skip
 def test_no_period_is_invented(command):
     before = make_recording(command)
     assert find_segments(before) == (before, "")
+
+
+def test_levels_one_after_another_become_segments():
+    """In one recording, with rest before, between and after, a sweep, and other waves of other periods."""
+    sweep = np.sin(1e-5 * np.arange(3000) ** 2)
+    pieces = [
+        np.zeros(250), tile_noise(500, 7), 2 * tile_noise(500, 5), np.zeros(700), tile_noise(900, 4, seed=4), sweep,
+        np.tile(tile_noise(100, 1, seed=5), 30), np.zeros(30),
+    ]  # fmt: skip
+    ends = np.cumsum([len(piece) for piece in pieces])
+    found, said = find_segments(make_recording(np.concatenate(pieces)))
+    assert [(s.start, s.stop, s.kind, s.period) for s in found.segments] == [
+        (250, ends[1], "multisine", 500), (ends[1], ends[2], "multisine", 500), (ends[3], ends[4], "multisine", 900),
+        (ends[4], ends[5], "noise", 0), (ends[5], ends[6], "multisine", 500),
+    ]  # fmt: skip
+    assert said.startswith("In 4 of 5 parts the excitation repeats exactly, every 500 and 900 samples")
+
+
+def test_two_channels_repeat_only_together():
+    both = np.column_stack([tile_noise(500, 8), tile_noise(700, 8, seed=2)[:4000]])
+    assert find_segments(make_recording(both))[0].segments == ()
+    steps = np.column_stack([tile_noise(500, 8), 3 * tile_noise(500, 8, seed=2)])
+    found, _ = find_segments(make_recording(np.vstack([steps, 0.5 * steps])))
+    assert [(s.start, s.stop, s.period) for s in found.segments] == [(0, 4000, 500), (4000, 8000, 500)]
 
 
 def test_segments_of_its_own_stay():
