@@ -262,6 +262,8 @@ SLEW_REACHED_SHARE = 0.25
 # largest share of the noise in the mean square of the acceleration: about the relative bias of an estimated mass
 ACCELERATION_NOISE_SHARE = 0.01
 HIGHEST_BAND_END_RATIO = 0.2  # largest upper end of the band, relative to the sample rate
+# mean square of the difference of two sensors of a point up to which they are fused, relative to their noise
+LARGEST_SENSOR_DISAGREEMENT = 2.0
 LEAST_BAND_END_CYCLES = 20.0  # least upper end of the band, in cycles per recording
 SECOND_BAND_SHARE = 0.5  # share of the noise-limited band, below which the motion's band is balanced as well
 # share of the samples in which the device moves, below which a second balance uses only these samples

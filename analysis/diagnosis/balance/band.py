@@ -79,6 +79,12 @@ def _find_usable_lines_hz(column: FloatArray, rate_hz: float, exponent: int) -> 
     return np.asarray(frequency_hz[noise_power <= ACCELERATION_NOISE_SHARE * signal_power])
 
 
+def estimate_white_noise_density(column: FloatArray, rate_hz: float) -> float:
+    """Estimate the spectral density of the white noise of a channel (n,): one-sided, in squared units per Hz."""
+    line = np.linspace(column[0], column[-1], len(column))
+    return _estimate_signal_and_noise_density(column - line, rate_hz)[2]
+
+
 def _estimate_signal_and_noise_density(column: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, float]:
     """Estimate the spectral density of a channel (n,). Returns the frequencies (lines,) above 0 in Hz, the density
     (lines,) there in squared units per Hz, and that of its white noise: the median over the upper quarter of the

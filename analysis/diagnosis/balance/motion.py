@@ -124,10 +124,11 @@ def _is_varying(samples: FloatArray) -> bool:
 
 
 def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
-    """Compute the motion of each record, with derivatives and forces; missing samples are interpolated. Under a
-    zero-order hold, a motion that was not imposed is advanced by half a sample; the acceleration of a free motion is
-    set to zero. records: with the same channels, units and rate. band_hz: upper end of the band (Hz); None = the
-    highest that the noise allows. Raises NoMotionError where there are no records, or a record contains no motion."""
+    """Compute the motion of each record, with derivatives and forces; missing samples are interpolated. Positions are
+    fused with measured accelerations. Under a zero-order hold, a motion that was not imposed is advanced by half a
+    sample; the acceleration of a free motion is set to zero. records: with the same channels, units and rate. band_hz:
+    upper end of the band (Hz); None = the highest that the noise allows. Raises NoMotionError where there are no
+    records, or a record contains no motion."""
     motion_signals = find_motion_signals([record.recording for record in records])
     if not motion_signals or not all(any(map(_is_varying, signal.samples.T)) for signal in motion_signals):
         raise NoMotionError("no response is a position, velocity or acceleration")
@@ -138,6 +139,10 @@ def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -
     if band_hz is None:
         band_hz = np.inf if is_untimed else compute_band_end_hz(filled_samples, rate_hz, order)
     lowest_hz = compute_band_begin_hz(filled_samples, rate_hz) if order == 2 and not is_untimed else 0.0
+    if order == 0 and np.isfinite(band_hz):
+        from analysis.diagnosis.balance.fused_motion import fuse_with_accelerations
+
+        filled_samples = fuse_with_accelerations(records, filled_samples, band_hz)
     conditions, condition_samples = _standardise_conditions(records)
     return tuple(
         replace(
