@@ -24,7 +24,7 @@ LARGEST_SHIFT_S = 0.1
 LARGEST_PPM = 2e4
 """Largest drift (1e-6): a larger one is taken for a wrong sample rate."""
 LEAST_DRIFT_SIGMA = 5.0
-"""Least drift, in standard errors, for the effect to be tried."""
+"""Least drift, in standard errors, for the effect to be tried, or for a clock of the position to be ruled out."""
 
 
 def _apply_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
@@ -40,16 +40,17 @@ def _apply_position_drift(position: FloatArray, sample_rate_hz: float, values: V
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Find ppm from the slope of the response's time shift over time. Two sets of values, with band-limited and with
-    linear interpolation, the better fit first: only linear interpolation lowers peaks. Empty where the slope is not
-    known, not significant or too large, and for a channel above 0 (the clock is common to all)."""
+    """Find ppm from the slope of the response's time shift over time. Sets of values with band-limited and with linear
+    interpolation, the better fit first: only linear interpolation lowers peaks; each with every possible clock of the
+    position (`_list_position_shares`). Empty where the slope is not known, not significant or too large, and for a
+    channel above 0 (the clock is common to all)."""
     shift_rate = _estimate_significant_shift_rate(evidence) if channel <= 0 else None
     if shift_rate is None:
         return ()
-    with_position = _detect_position_drift(evidence, shift_rate)
     starts = [
-        {"ppm": -1e6 * shift_rate, "interpolated": linear_share, "with_position": with_position}
+        {"ppm": -1e6 * shift_rate, "interpolated": linear_share, "with_position": position_share}
         for linear_share in (0.0, 1.0)
+        for position_share in _list_position_shares(evidence, shift_rate)
     ]
     return tuple(sorted(starts, key=lambda values: _compute_misfit(evidence, values)))
 
@@ -61,21 +62,19 @@ def _compute_misfit(evidence: Evidence, values: Values) -> float:
     return float(np.sum((((evidence.response - drifted_prediction) / evidence.noise) ** 2)[evidence.used > 0]))
 
 
-def _detect_position_drift(evidence: Evidence, response_shift_rate: float) -> float:
-    """Detect the clock of the measured position: 1 where it drifts as the response does, or where this cannot be
-    determined; 0 where the slope of its time shift is nearer to 0. response_shift_rate: s per s."""
-    if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
-        return 1.0
-    position_noise = evidence.position_noise
-    position_rate_and_error = _estimate_shift_rate(
-        evidence, evidence.position / position_noise, evidence.predicted_position / position_noise
-    )
-    return (
-        1.0
-        if position_rate_and_error is None
-        or abs(position_rate_and_error[0] - response_shift_rate) < abs(position_rate_and_error[0])
-        else 0.0
-    )
+def _list_position_shares(evidence: Evidence, response_shift_rate: float) -> tuple[float, ...]:
+    """List the values of `with_position` that agree with the slope of the position's time shift within its error, or
+    else the nearer: 1 for the response's slope (s per s), 0 for none. (1,) where the slope is not known."""
+    position, predicted, noise = evidence.position, evidence.predicted_position, evidence.position_noise
+    if position is None or predicted is None or noise is None:
+        return (1.0,)
+    rate_and_error = _estimate_shift_rate(evidence, position / noise, predicted / noise)
+    if rate_and_error is None:
+        return (1.0,)
+    shift_rate, standard_error = rate_and_error
+    distances = {1.0: abs(shift_rate - response_shift_rate), 0.0: abs(shift_rate)}
+    largest_distance = max(LEAST_DRIFT_SIGMA * standard_error, min(distances.values()))
+    return tuple(share for share, distance in distances.items() if distance <= largest_distance)
 
 
 def _estimate_significant_shift_rate(evidence: Evidence) -> float | None:

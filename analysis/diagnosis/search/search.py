@@ -23,15 +23,13 @@ Reference: Hastie, Tibshirani and Friedman, The Elements of Statistical Learning
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.limits import EXPLAINED_ERROR
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, explain, is_worth_searching, start_explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import has_no_predictive_power
-from analysis.diagnosis.search.parsimony import has_far_smaller_error
+from analysis.diagnosis.search.parsimony import has_far_smaller_error, has_small_error
 from analysis.diagnosis.search.revise_selection import (
     drop_negligible_effects,
     drop_unconfirmed_effects,
@@ -109,8 +107,8 @@ def search_effects(
     if is_worth_searching(context, single, single.after) and judge(single).verdict != "explained":
         first_result = further.before_pairs(first_result)
     found = first_result.found
-    has_small_error = found.statistic is not None or found.after.score.worst_channel <= EXPLAINED_ERROR
-    if first_result.judgement.verdict == "explained" and has_small_error:
+    is_close = found.statistic is not None or found.after.score.worst_channel <= EXPLAINED_ERROR
+    if first_result.judgement.verdict == "explained" and is_close:
         return first_result
     pair = add_effects(context, catalogue, single, progress, time_left, max_effects=2)
     pair = exchange_first_for_relatives(context, pair, catalogue, progress, time_left)
@@ -263,21 +261,22 @@ def _search_with_opened(
 def _adds_confirmed(earlier: SearchResult, repeated: SearchResult, parts: int) -> bool:
     """Whether the search with opened samples names new effects, confirmed by the samples still held out, in addition to
     all of `earlier`, or to a part of them if the error is then within the noise. parts: as of `_repeat_with_opened`;
-    parts finer than halves lie between fitted samples, so that their error must be at most `EXPLAINED_ERROR`."""
+    parts finer than halves lie between fitted samples, so that their error must be small (`has_small_error`) compared
+    with that without the new effects."""
     earlier_fit, explanation = earlier.found.after if earlier.judgement.named else earlier.found.retuned, repeated.found
-    if parts > HALVES and np.nanmax(explanation.after.score.test, initial=0.0) > EXPLAINED_ERROR:
-        return False
     earlier_sites, new_sites = _list_effect_sites(earlier_fit), _list_effect_sites(explanation.after)
     replaces = is_near_noise(explanation) and earlier_sites & new_sites
     if not repeated.judgement.named or not new_sites - earlier_sites or not (earlier_sites <= new_sites or replaces):
         return False
-    if not earlier.judgement.named:
-        return True
-    # The first effects are refitted to the opened samples, so that this gain is not credited to the new effect.
-    context, fitted = repeated.context, earlier_fit.fitted
-    start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-    refitted = context.with_test_score(context.score_fit(refine(context, start)))
-    return has_confirmed_addition(refitted, explanation.after)
+    base, context = explanation.retuned, repeated.context
+    if earlier.judgement.named:
+        # The first effects are refitted to the opened samples, so that this gain is not credited to the new effect.
+        fitted = earlier_fit.fitted
+        start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+        base = context.with_test_score(context.score_fit(refine(context, start)))
+        if not has_confirmed_addition(base, explanation.after):
+            return False
+    return parts <= HALVES or has_small_error(base.compared_by_test(), explanation.after.compared_by_test())
 
 
 def _list_effect_sites(candidate: FittedCandidate) -> set[tuple[str, int]]:

@@ -62,6 +62,10 @@ class FittedCandidate:
         mean_log = float(np.mean(np.log(self.score.test)))
         return np.inf if np.isnan(mean_log) else mean_log
 
+    def compared_by_test(self) -> "FittedCandidate":
+        """Return the candidate with its held-out errors in place of the others, to compare it by these."""
+        return replace(self, score=FitScore(self.score.test, self.score.test, self.score.test))
+
 
 HALVES, FINER_PARTS = 2, (8, 32, 128)
 """Numbers of equal parts into which each held-out stretch is cut, alternately opened and held out. More parts are used

@@ -1,11 +1,21 @@
 """The table of verdicts, over invented errors."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from analysis.diagnosis.search import search
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import compute_mismatch_share
-from analysis.diagnosis.search.verdict import compute_step_shares, has_confirmed_addition, judge
+from analysis.diagnosis.search.search_context import FINER_PARTS, HALVES
+from analysis.diagnosis.search.verdict import (
+    Judgement,
+    SearchResult,
+    compute_step_shares,
+    has_confirmed_addition,
+    judge,
+)
 
 RUBS = "coulomb_friction"
 
@@ -124,3 +134,33 @@ def test_an_effect_is_added_to_a_name_where_the_worst_held_out_channel_says_so(
 ):
     left = [make_candidate(1.0, RUBS, test=test) for test in (without, with_it)]
     assert has_confirmed_addition(*left) is confirmed
+
+
+ALTERNATE_PARTS = FINER_PARTS[-1]
+
+
+@pytest.mark.parametrize("is_named", [True, False])
+@pytest.mark.parametrize(
+    ("without", "with_it", "parts", "confirmed"),
+    [
+        ([1.3, 7.8], [1.0, 1.1], ALTERNATE_PARTS, True),
+        ([1.3, 7.8], [1.0, 1.14], ALTERNATE_PARTS, True),
+        ([1.0, 1.6], [1.0, 1.14], ALTERNATE_PARTS, False),
+        ([1.3, 1000.0], [1.0, 1.31], ALTERNATE_PARTS, False),
+        ([1.0, 1.6], [1.0, 1.14], HALVES, True),
+    ],
+    ids=["noise left", "nearly all taken", "a part taken", "taken from much", "halves"],
+)
+def test_between_fitted_parts_an_effect_must_leave_noise_or_take_nearly_all_that_is_missing(
+    make_candidate, monkeypatch, without, with_it, parts, confirmed, is_named
+):
+    alone, both = make_candidate(1.0, RUBS, test=without), make_candidate(1.0, RUBS, "end_stop", test=with_it)
+    context = SimpleNamespace(measure=None, tuning=None, score_fit=lambda fit: fit, with_test_score=lambda fit: alone)
+    monkeypatch.setattr(search, "evaluate_fit", lambda *given: None)
+    monkeypatch.setattr(search, "refine", lambda *given: None)
+    earlier = SearchResult(
+        context, SimpleNamespace(after=alone, retuned=alone), Judgement("partly_explained", is_named)
+    )
+    found = SimpleNamespace(after=both, retuned=alone)
+    repeated = SearchResult(context, found, Judgement("explained", True))
+    assert search._adds_confirmed(earlier, repeated, parts) is confirmed

@@ -66,6 +66,24 @@ def test_whether_the_position_drifts_along_is_seen(bench, command, with_position
     assert DRIFT.starts(bench.evidence(model, seen), 0)[0]["with_position"] == with_position
 
 
+def test_where_the_position_does_not_show_its_clock_both_are_suggested(bench, command):
+    """As where the model's error shifts the position by other times in each window."""
+    model = bench.three_axes()
+    evidence = bench.evidence(
+        model, bench.measured(model, bench.placed("clock_drift", {"ppm": 100.0}, *ALL), command, 4)
+    )
+    window = int(2.0 * evidence.sample_rate_hz)
+    shifts = np.random.default_rng(4).integers(-20, 21, len(command) // window + 1)
+    shifted = np.vstack([
+        np.roll(evidence.predicted_position[number * window : (number + 1) * window], shift, axis=0)
+        for number, shift in enumerate(shifts)
+    ])  # fmt: skip
+    starts = DRIFT.starts(replace(evidence, predicted_position=shifted), 0)
+    assert sorted((start["interpolated"], start["with_position"]) for start in starts) == [
+        (0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize("offset_s", [3e-4, -0.0123, 0.25])
 def test_a_loggers_offset_is_found_and_spares_the_position(bench, command, offset_s):
     model = bench.three_axes()
