@@ -89,7 +89,7 @@ def find_balance(
     the laws of the motion are searched again for the force that it gives; that must halve the error of one body."""
     axis, rotational = driven.index, driven.rotational
     balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
-    actuator = find_command_law(balance, driven, excluded, map_) if balance.tested else None
+    actuator = find_command_law(balance, driven, excluded, map_) if balance.tested and time_left() else None
     if actuator is None:
         return balance
     judged_law = actuator.judged_law

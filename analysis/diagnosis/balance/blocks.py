@@ -103,6 +103,13 @@ def sum_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[Float
     return np.asarray(grams.sum(axis=0)), np.asarray(crosses.sum(axis=0))
 
 
+def merge_blocks(blocks: Sequence[Block], columns: Sequence[int]) -> Block:
+    """Merge blocks, at least one, to one with these columns alone; its samples are those of the first."""
+    gram, cross = sum_products(blocks, columns)
+    power, centred_power = (sum(block.power for block in blocks), sum(block.centred_power for block in blocks))
+    return Block(gram, cross, power, centred_power, blocks[0].motion_index, blocks[0].rows)
+
+
 def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
     """Solve for weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge:
     added to the diagonal, relative to its mean, with 1e-300 for a matrix of zeros. Raises LinAlgError where a system is
@@ -160,8 +167,8 @@ def compute_squared_error(products: tuple[FloatArray, FloatArray], weights: Floa
 def compute_squared_errors(
     blocks: Sequence[Block], products: tuple[FloatArray, FloatArray], weights: FloatArray
 ) -> FloatArray:
-    """Compute (blocks,): residual sums of squares. products: `stack_products` of these blocks. weights: (c,) or
-    (blocks, c)."""
+    """Compute (..., blocks): residual sums of squares. products: `stack_products` of these blocks, (..., blocks, c, c)
+    and (..., blocks, c). weights: (c,) or (..., blocks, c)."""
     weights = np.broadcast_to(weights, products[1].shape)
     power = np.array([block.power for block in blocks])
     squares = ((products[0] @ weights[..., None])[..., 0] * weights).sum(axis=-1)

@@ -290,7 +290,7 @@ def _judge_further_laws(
         values, share = fit_values(regression, law_indices)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
         objection = VARYING_GAIN_OBJECTION if gain > FURTHER_LAW_GAIN else SMALL_GAIN_OBJECTION
         if chosen.laws:
-            objection = "it explains too little in addition to the other terms"
+            objection = "it explains too little of the fitted data in addition to the other terms"
         if gain > 0 and gain_low > 0:
             law = regression.laws[index]
             further_laws.append(JudgedLaw(

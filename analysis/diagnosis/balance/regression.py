@@ -22,6 +22,7 @@ from analysis.diagnosis.balance.blocks import (
     build_blocks,
     compute_scale,
     compute_squared_errors,
+    merge_blocks,
     solve_normal_equations,
     solve_ridge,
     solve_without_columns,
@@ -30,11 +31,19 @@ from analysis.diagnosis.balance.blocks import (
 )
 from analysis.diagnosis.balance.laws.law import BaseTerms, Law
 from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.limits import BALANCE_FOLDS
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 RIDGE_PARAMETERS = tuple(10.0**exponent for exponent in range(-8, 1))
 """Ridge parameters relative to the mean power of a column; cross-validation selects one. Chosen by hand."""
+
+MOST_RIDGE_FOLDS = 4 * BALANCE_FOLDS
+"""Largest number of folds of a fit of all laws, each of which takes a solution per ridge parameter: a recording of
+hundreds of short parts has as many blocks. Chosen."""
+NUMBERS_AT_ONCE = 100_000
+"""Size of the Gram matrices of the selections of columns that are cross-validated together (or those of one selection),
+to limit the memory. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,11 +102,23 @@ class Regression:
     def cross_validate(self, columns: Sequence[int]) -> FloatArray:
         """Compute (blocks,): residual sum of squares of each fit block, with weights fitted to the other blocks
         (leave-one-block-out cross-validation)."""
-        products = stack_products(self.fit, columns)
-        weights = self._solve_nonnegative(
-            (products[0].sum(axis=0) - products[0], products[1].sum(axis=0) - products[1])
-        )
-        return compute_squared_errors(self.fit, products, weights)
+        return self.cross_validate_each([columns])[0]
+
+    def cross_validate_each(self, selections: Sequence[Sequence[int]]) -> list[FloatArray]:
+        """Cross-validate several selections of columns; selections of equal length are computed together."""
+        errors: list[FloatArray] = [np.empty(0)] * len(selections)
+        for size in {len(columns) for columns in selections}:
+            indices = [index for index, columns in enumerate(selections) if len(columns) == size]
+            stride = max(NUMBERS_AT_ONCE // max(len(self.fit) * size**2, 1), 1)
+            for first in range(0, len(indices), stride):
+                chosen = indices[first : first + stride]
+                stacked = [stack_products(self.fit, selections[index]) for index in chosen]
+                grams, crosses = np.stack([gram for gram, _ in stacked]), np.stack([cross for _, cross in stacked])
+                training = grams.sum(axis=1, keepdims=True) - grams, crosses.sum(axis=1, keepdims=True) - crosses
+                squares = compute_squared_errors(self.fit, (grams, crosses), self._solve_nonnegative(training))
+                for index, block_errors in zip(chosen, squares, strict=True):
+                    errors[index] = block_errors
+        return errors
 
     def compute_test_errors(self, columns: Sequence[int]) -> FloatArray:
         """Compute (blocks,): residual sum of squares of each test block, with weights fitted to all fit blocks."""
@@ -218,9 +239,21 @@ def _make_base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
 def make_law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
     """Make a law's filtered and decimated columns (kept samples, k) per motion; None where any is zero or not
     finite."""
-    columns = [motion.decimate(law.make_columns(motion, law.numbers)) for motion in motions]
+    columns = _decimate_each(motions, [law.make_columns(motion, law.numbers) for motion in motions])
     is_usable = all(np.isfinite(column).all() for column in columns) and all(_is_above_rounding(columns))
     return columns if is_usable else None
+
+
+def _decimate_each(motions: Sequence[Motion], columns: Sequence[FloatArray]) -> list[FloatArray]:
+    """Filter and decimate columns (n, k) per motion, with one k (`Motion.decimate`); all parts of one length at once,
+    because a filter of many short parts one by one takes most of its time to begin."""
+    decimated = list(columns)
+    for length in {len(column) for column in columns}:
+        indices = [index for index, column in enumerate(columns) if len(column) == length]
+        together = motions[indices[0]].decimate(np.hstack([columns[index] for index in indices]))
+        for index, part in zip(indices, np.split(together, len(indices), axis=1), strict=True):
+            decimated[index] = np.ascontiguousarray(part)
+    return decimated
 
 
 def _is_above_rounding(columns: Sequence[FloatArray]) -> Mask:
@@ -230,16 +263,21 @@ def _is_above_rounding(columns: Sequence[FloatArray]) -> Mask:
 
 
 def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:
-    """Fit all these columns by ridge regression: the cross-validated sum of squares, and that of each test block
-    (blocks,). The ridge parameter is the one of `RIDGE_PARAMETERS` with the least cross-validated error; it does not
-    act on the base."""
+    """Fit all these columns by ridge regression: the cross-validated sum of squares, over at most `MOST_RIDGE_FOLDS`
+    folds of consecutive blocks, and that of each test block (blocks,). The ridge parameter is the one of
+    `RIDGE_PARAMETERS` with the least cross-validated error; it does not act on the base."""
     is_base = np.array([k < regression.base_column_count for k in columns])
-    products = stack_products(regression.fit, columns)
+    fold_count = min(len(regression.fit), MOST_RIDGE_FOLDS)
+    folds = [
+        merge_blocks(regression.fit[indices[0] : indices[-1] + 1], columns)
+        for indices in np.array_split(np.arange(len(regression.fit)), fold_count)
+    ]
+    products = stack_products(folds, range(len(columns)))
     total_products = products[0].sum(axis=0), products[1].sum(axis=0)
     training = add_prior((total_products[0] - products[0], total_products[1] - products[1]), regression.prior)
     total_products = add_prior(total_products, regression.prior)
     errors = [
-        float(compute_squared_errors(regression.fit, products, solve_ridge(training, ridge, is_base)).sum())
+        float(compute_squared_errors(folds, products, solve_ridge(training, ridge, is_base)).sum())
         for ridge in RIDGE_PARAMETERS
     ]
     best = int(np.argmin(errors))

@@ -6,8 +6,9 @@ significantly. The error of a structure is the sum over folds of the squared for
 other folds. `search_structures` runs the search, `choose_simplest_structure` selects the result.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
@@ -77,7 +78,7 @@ def search_structures(
     base: BaseTerms | GivenModelBase | None = None,
 ) -> StructureSearch:
     """Search for the sum of at most `MOST_SUMMED_LAWS` laws with the least cross-validated error. excluded: effects
-    left out. base: None = mass, damping and stiffness alone. Raises NoMotionError without samples to fit."""
+    left out; without time, all are. base: None = mass, damping, stiffness. Raises NoMotionError without samples."""
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     scales = [measure_scales(motions, c, rotational) for c in range(len(motions[0].channels))]
@@ -85,7 +86,7 @@ def search_structures(
     base_laws = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
     candidate_laws = [
         law
-        for law in make_laws(motions, rotational)
+        for law in (make_laws(motions, rotational) if time_left() else ())
         if excluded.isdisjoint((law.effect, SIMULATED_AS.get(law.effect))) and (law.key, law.numbers) not in base_laws
     ]
     if isinstance(base, GivenModelBase):
@@ -95,7 +96,7 @@ def search_structures(
             return StructureSearch(regression, base_only, base_only, (base_only,), True)
     else:
         regression = build_regression(motions, axis, candidate_laws, turns_freely, base)
-    if "cogging" not in excluded:
+    if "cogging" not in excluded and time_left():
         regression = _add_cogging_laws(regression, scales)
     linear = _fit_linear_structure(regression)
     regression, ranked, best = _search(regression, linear, time_left)
@@ -111,7 +112,7 @@ def _search(
         sums = _add_law_to_each(regression, beam) if time_left() else []
         if not sums:
             break
-        regression = refine_parameters(regression, sums[:STRUCTURES_BEAM])
+        regression = refine_parameters(regression, takewhile(lambda _: time_left(), sums[:STRUCTURES_BEAM]))
         sums = [replace(s, errors=regression.cross_validate(regression.select_columns(s.laws))) for s in sums]
         ranked += sums
         beam = sorted(sums, key=lambda s: s.error)[:STRUCTURES_BEAM]
@@ -150,14 +151,16 @@ def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[
     best: dict[tuple[tuple[str, int], ...], Structure] = {}
     for structure in beam:
         keys = {regression.laws[k].key for k in structure.laws}
-        for law_index, law in enumerate(regression.laws):
-            if law.key in keys or any(_have_common_column(law.key, key) for key in keys):
-                continue
-            laws = tuple(sorted((*structure.laws, law_index)))
-            extended = Structure(laws, regression.cross_validate(regression.select_columns(laws)))
-            effects = tuple(sorted(regression.laws[k].key for k in laws))
-            if (effects not in best or extended.error < best[effects].error) and _is_physical(regression, laws):
-                best[effects] = extended
+        sums = [
+            tuple(sorted((*structure.laws, index)))
+            for index, law in enumerate(regression.laws)
+            if law.key not in keys and not any(_have_common_column(law.key, key) for key in keys)
+        ]
+        errors = regression.cross_validate_each([regression.select_columns(laws) for laws in sums])
+        for grown in map(Structure, sums, errors):
+            effects = tuple(sorted(regression.laws[k].key for k in grown.laws))
+            if (effects not in best or grown.error < best[effects].error) and _is_physical(regression, grown.laws):
+                best[effects] = grown
     return sorted(best.values(), key=lambda s: s.error)
 
 
@@ -209,7 +212,7 @@ def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequenc
     return append_laws(regression, cogging) if cogging else regression
 
 
-def refine_parameters(regression: Regression, structures: Sequence[Structure]) -> Regression:
+def refine_parameters(regression: Regression, structures: Iterable[Structure]) -> Regression:
     """Refine the nonlinear parameters of the structures' laws to the least cross-validated error, each law in the first
     structure that has it."""
     regression, refined = copy_columns(regression), set[int]()
@@ -218,8 +221,7 @@ def refine_parameters(regression: Regression, structures: Sequence[Structure]) -
             if law_index not in refined and regression.laws[law_index].bounds:
                 refined.add(law_index)
                 reduced = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
-                updated = overwrite_law(regression, law_index, _refine_law(reduced, index_in_sum))
-                regression = updated or regression
+                regression = overwrite_law(regression, law_index, _refine_law(reduced, index_in_sum)) or regression
     return regression
 
 
@@ -266,7 +268,7 @@ def choose_simplest_structure(search: StructureSearch) -> Structure:
 
 
 def add_further_laws(search: StructureSearch, base: Structure, all_laws_error: float) -> Structure | None:
-    """Add laws to `base` that explain most of what all laws together could explain; None without such laws."""
+    """Add laws to `base` that explain most of what all laws together could; None without such laws."""
     limit = base.error - max(FURTHER_LAW_EXCESS * (base.error - all_laws_error), FURTHER_LAW_SHARE * base.error)
     extensions = [
         s

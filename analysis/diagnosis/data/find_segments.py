@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import fftconvolve
+from scipy.fft import irfft, next_fast_len, rfft
 
 from analysis.diagnosis.data.observed_parts import MOST_PERIODS
 from analysis.diagnosis.noise.rounding import find_rounding_step
@@ -198,8 +198,11 @@ class _Recurrences:
     equal weighted sums; windows are compared by these sums, with fixed random weights, in logarithmic time."""
 
     def __init__(self, command: FloatArray) -> None:
-        weights = np.random.default_rng(0).uniform(1.0, 2.0, (SHORTEST_DECLARED_PERIOD, command.shape[1]))
-        self._sums = fftconvolve(command, weights[::-1], mode="valid", axes=0).sum(axis=1)
+        width = SHORTEST_DECLARED_PERIOD
+        weights = np.random.default_rng(0).uniform(1.0, 2.0, (width, command.shape[1]))
+        fft_length = next_fast_len(len(command), real=True)
+        products = np.conj(rfft(weights, fft_length, axis=0)) * rfft(command, fft_length, axis=0)
+        self._sums = irfft(products.sum(axis=1), fft_length)[: len(command) - width + 1]
         self._weight = weights.sum(axis=0)
         self._rounding = 1e-9 * float(np.abs(self._sums).max())  # of the Fourier transform, with a margin
         self._order = np.argsort(self._sums)

@@ -28,7 +28,7 @@ from analysis.diagnosis.first_model.model_structures import (
 )
 from analysis.diagnosis.limits import MODES_GAIN, REPORTED_REMAINDER_SHARE, RICHER_STRUCTURE_GAIN
 from equalizer.identification.mechanical.mechanical_free_simulation import compute_simulation_errors
-from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
+from equalizer.identification.mechanical.mechanical_lines import compute_all_lines, split_fit_and_test
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -254,11 +254,7 @@ def _compute_simulation_errors(
     """Compute each model's error in a free simulation of the samples kept for a test, or of those to fit where none
     are; None where no segment is excited."""
     fit_recordings, test_recordings = split_fit_and_test(recordings)
-    segment_lines = [
-        lines
-        for recording_part in test_recordings or fit_recordings
-        if (lines := compute_segment_lines(*recording_part)) is not None
-    ]
+    segment_lines = compute_all_lines(test_recordings or fit_recordings)
     if not segment_lines:
         return None
     edges_hz = [

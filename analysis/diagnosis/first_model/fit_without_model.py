@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.balances import find_balances
+from analysis.diagnosis.balance.laws.law import measure_scales
 from analysis.diagnosis.balance.linear_part import assign_channels, compute_errors_without_channel
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
@@ -57,7 +58,11 @@ FREE_REMARK = (
     "No model was given. A damper per axis, and a spring where one can be fitted, were fitted first to the force per "
     "unit mass that the free motion shows; the mass in the file is 1, because a free motion does not determine it."
 )
-"""Remarks of a diagnosis on its first model, by the method of the fit."""
+FIT_OUT_OF_TIME = (
+    "The time limit was reached while the linear model was fitted: a model with more modes may fit better. A later "
+    "limit, or --model with a model of `hapteq model`, avoids this."
+)
+"""Remarks of a diagnosis on its first model, by the method of the fit, and on a fit that the time limit ended."""
 
 EXCHANGED_ERROR_RATIO = 2.0
 """Ratio of the squared errors of a force balance without the other and without the own channel from which these are
@@ -74,8 +79,8 @@ def fit_first_model(
 ) -> FirstModel:
     """Fit the first model: by force balance where that is possible, else by `fit_first_linear_model`, which takes
     longer. recordings: at least one, as converted by `one_motion_per_force`. excluded_effects: names of effects that
-    the balance must not name. time_left: time limit of the balance. on_progress: called with a text and the completed
-    fraction, 0 to 1, of which the balance counts as the first half. map_: a possibly parallel `map`. Raises
+    the balance must not name. time_left: time limit of the balance and the fit. on_progress: called with a text and the
+    completed fraction, 0 to 1, of which the balance counts as the first half. map_: a possibly parallel `map`. Raises
     NothingToDiagnoseError where no model can be fitted, or a recording was made with a weight."""
     _require_no_weight(recordings)
     on_progress("testing laws in the force balance", 0.0)
@@ -94,7 +99,9 @@ def fit_first_model(
         return FirstModel(model, (BALANCE_REMARK,), balances)
     on_progress("fitting a linear model, as none was given", 0.5)
     model, remarks = fit_first_linear_model(
-        recordings, lambda fraction: on_progress("fitting a linear model, as none was given", 0.5 + fraction / 2)
+        recordings,
+        lambda fraction: on_progress("fitting a linear model, as none was given", 0.5 + fraction / 2),
+        time_left=time_left,
     )
     return FirstModel(model, remarks, balances)
 
@@ -122,13 +129,19 @@ def _fit_structure_by_balance(recordings: Sequence[Recording], kind: Kind) -> Me
 
 
 def fit_first_linear_model(
-    recordings: Sequence[Recording], on_progress: Callable[[float], None], source: str = "these recordings"
+    recordings: Sequence[Recording],
+    on_progress: Callable[[float], None],
+    source: str = "these recordings",
+    time_left: TimeBudget = lambda: True,
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """Fit a linear model to forces (`fit_rigid_model`) or to frequency responses. Returns the model and remarks, as
     sentences. on_progress: called with the completed fraction, 0 to 1. source: description of the recordings, for the
-    remarks. Raises NothingToDiagnoseError where no model can be fitted, or a recording was made with a weight."""
+    remarks. time_left: where it returns False, the fit ends with the best structure so far. Raises
+    NothingToDiagnoseError where no model can be fitted, or a recording was made with a weight."""
     _require_no_weight(recordings)
-    settings = MechanicalFitSettings(band_hz=_find_stated_band(recordings))
+    settings = MechanicalFitSettings(
+        band_hz=_find_stated_band(recordings), grounded=not _turn_freely(recordings), time_left=time_left
+    )
     if should_use_rigid_model(recordings) and (rigid_model := _try_rigid_model(recordings, source)) is not None:
         return rigid_model, (RIGID_REMARK,)
     try:
@@ -149,6 +162,7 @@ def fit_first_linear_model(
     )
     return widen_tolerance(fit.model), (
         first_remark,
+        *(() if time_left() else (FIT_OUT_OF_TIME,)),
         *(format_sentence(remark) for remark in fit.remarks),
     )
 
@@ -192,6 +206,17 @@ def _find_stated_band(recordings: Sequence[Recording]) -> tuple[float, float] | 
             (f"the bands that the recordings state ({bands}) have no common part; diagnose them separately",)
         )
     return low_hz, high_hz
+
+
+def _turn_freely(recordings: Sequence[Recording]) -> bool:
+    """Whether every measured shaft turns freely, so that no spring holds it (`Scales.turns_freely`); False where no
+    motion can be computed."""
+    try:
+        motions = compute_motions(observe_parts(recordings, len(recordings[0].response.channels)))
+    except NoMotionError:
+        return False
+    channels, is_rotational = range(len(motions[0].channels)), recordings[0].is_rotational
+    return all(measure_scales(motions, channel, is_rotational).turns_freely for channel in channels)
 
 
 def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:

@@ -2,7 +2,8 @@
 
 The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. The
 tolerance of a matrix is half the largest difference between its entries and those of the balances with the named laws
-(not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry, at least 1e-12. A diagonal mass
+(not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry: 0 for a matrix of zeros, such as
+the stiffness of a shaft that turns freely, which is then not re-tuned. A diagonal mass
 is at least `MASSLESS_SHARE` of the force's rms over that of the acceleration, because every coordinate of a mechanical
 model needs a mass.
 
@@ -59,8 +60,7 @@ def build_first_model(balances: Sequence[Balance], recording: Recording, name: s
         stiffness,
         np.eye(command_count),
         np.eye(command_count),
-        # A tolerance must be positive, also of a matrix of zeros.
-        tolerance=Tolerance(max(tolerances[0], 1e-12), max(tolerances[1], 1e-12), max(tolerances[2], 1e-12), None),
+        tolerance=Tolerance(tolerances[0], tolerances[1], tolerances[2]),
         actuator=ActuatorLimits(delay_s=_find_common_delay_s(balances)),
         rotational=recording.is_rotational,
     )

@@ -13,6 +13,7 @@ import numpy as np
 from analysis.diagnosis.balance.laws.friction_laws import LEAST_WIDTH_SHARE
 from analysis.diagnosis.balance.laws.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
+from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.measured_motion import FORCE_QUANTITIES
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.free_motion import convert_free_motion
@@ -29,6 +30,8 @@ DRIVE_QUANTITIES = FORCE_QUANTITIES | {"voltage", "current"} | set(DERIVATIVE_OF
 """Quantities of commands that drive a motion; all other commands, such as a temperature, are conditions."""
 CONSTANT_RANGE = 1e-9
 """Range of a signal over its largest magnitude, up to which changes are rounding errors. Chosen by hand."""
+GAIN_FOLDS = 8
+"""Number of stretches over which the gains of commands are cross-validated. Chosen."""
 MOTION_QUANTITIES = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 """Quantities of a motion: positions and their derivatives."""
 
@@ -206,10 +209,33 @@ def _sum_channels(signal: Signal, gains: FloatArray, main_command: int) -> Signa
 def _fit_gains(recordings: Recordings) -> tuple[FloatArray, int]:
     """Fit the gains (m,) of the commands relative to the strongest, and find its index. Gains are the weights of the
     commands in a regression of the acceleration on commands, velocity, position and dry friction; without a time axis,
-    of the position on commands and friction."""
-    motions = compute_motions(observe_parts(recordings, 1))
+    of the position on commands and friction. Commands in one unit have gains of 1 or -1 unless others are significantly
+    better: a command that is computed from the motion, such as a virtual spring, has no gain that the motion
+    determines."""
+    x, y = _make_gain_rows(recordings)
+    command = recordings[0].command
+    command_count = len(command.channels)
+    column_stds = np.maximum(x.std(axis=0), 1e-300)
+    x = x / column_stds
+    scaled_gains = _solve_truncated(x, y)[:command_count]
+    main_command = int(np.argmax(np.abs(scaled_gains)))
+    gains = scaled_gains / column_stds[:command_count]
+    gains /= gains[main_command]
+    if len(set(zip(command.quantities, command.units, strict=True))) == 1:
+        fitted = _cross_validate(x, y)
+        for equal_gains in (np.ones(command_count), np.where(gains < 0, -1.0, 1.0)):
+            sums = x[:, :command_count] @ (equal_gains * column_stds[:command_count])
+            summed = _cross_validate(np.column_stack([sums / max(float(sums.std()), 1e-300), x[:, command_count:]]), y)
+            if not improves_significantly(summed, fitted):
+                return equal_gains * equal_gains[main_command], main_command
+    return np.asarray(gains), main_command
+
+
+def _make_gain_rows(recordings: Recordings) -> tuple[FloatArray, FloatArray]:
+    """Make the rows of the regression of `_fit_gains`: regressors (n, k), the commands first, and the target (n,), all
+    without their means, because of two commands with a constant sum this sum would appear to drive the motion."""
     regressor_rows, motion_targets = [], []
-    for motion in motions:
+    for motion in compute_motions(observe_parts(recordings, 1)):
         friction = smooth_sign(motion.velocity, LEAST_WIDTH_SHARE * max(float(motion.velocity.std()), 1e-300))
         columns = [motion.force, motion.velocity, motion.position, friction]
         if not np.isfinite(motion.band_hz):
@@ -219,14 +245,23 @@ def _fit_gains(recordings: Recordings) -> tuple[FloatArray, int]:
         valid_mask = motion.mask_valid_samples(motion.fit)
         regressor_rows.append(motion.decimate(np.hstack(columns))[valid_mask])
         motion_targets.append(motion.decimate(motion_target)[valid_mask])
-    # The means are subtracted, and components of the size of rounding ignored: of two commands with a constant sum, the
-    # sum would otherwise appear to drive the motion.
     x, y = (stacked - stacked.mean(axis=0) for stacked in (np.vstack(regressor_rows), np.vstack(motion_targets)[:, 0]))
-    column_stds = np.maximum(x.std(axis=0), 1e-300)
-    scaled_gains = np.linalg.lstsq(x / column_stds, y, rcond=SINGULAR_VALUE_RATIO)[0][: motions[0].force.shape[1]]
-    main_command = int(np.argmax(np.abs(scaled_gains)))
-    gains = scaled_gains / column_stds[: len(scaled_gains)]
-    return np.asarray(gains / gains[main_command]), main_command
+    return x, y
+
+
+def _solve_truncated(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Solve x w = y by least squares, without components of the size of rounding. x: (n, k), of equal deviations."""
+    return np.asarray(np.linalg.lstsq(x, y, rcond=SINGULAR_VALUE_RATIO)[0])
+
+
+def _cross_validate(x: FloatArray, y: FloatArray) -> Structure:
+    """Compute the squared error of each of `GAIN_FOLDS` stretches, with weights fitted to the others."""
+    stretches = np.array_split(np.arange(len(y)), GAIN_FOLDS)
+    errors = [
+        float(np.sum((y[rows] - x[rows] @ _solve_truncated(np.delete(x, rows, 0), np.delete(y, rows))) ** 2))
+        for rows in stretches
+    ]
+    return Structure((), np.array(errors))
 
 
 def _find_lowest_derivative_channels(signal: Signal) -> list[int]:

@@ -27,8 +27,8 @@ def describe_black_box(black_box: BlackBox | None, is_effect_named: bool) -> str
         return ""
     physics_name = "the physics" if is_effect_named else "the re-tuned model"
     fit_text = (
-        f"A black box ({black_box.kind}, {black_box.coefficient_count} parameters), fitted to the same samples, has "
-        "an error of"
+        f"A black box ({black_box.kind}, {black_box.coefficient_count} parameter"
+        f"{'s' if black_box.coefficient_count != 1 else ''}), fitted to the same samples, has an error of"
     )
     errors_text = (
         f"{format_error_of_signal(black_box.test_error)} on the held-out data; {physics_name} has "

@@ -27,7 +27,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
 from equalizer.identification.mechanical.mechanical_free_simulation import compute_simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import (
     SegmentLines,
-    compute_segment_lines,
+    compute_all_lines,
     select_band,
     split_fit_and_test,
 )
@@ -87,7 +87,8 @@ def choose_structure(
     if settings.noncollocated_sensors:
         return _fit_noncollocated_sensors(groups, best, band_hz, settings, on_progress)
     collocated = StructureChoice(*grow_by_stages(groups, best, band_hz, settings, lambda share: on_progress(share / 2)))
-    if collocated.best.error < NONCOLLOCATED_ERROR or settings.noncollocated_sensors is False:
+    is_decided = settings.noncollocated_sensors is False or not settings.time_left()
+    if collocated.best.error < NONCOLLOCATED_ERROR or is_decided:
         return collocated
     noncollocated = _fit_noncollocated_sensors(
         groups, best, band_hz, settings, lambda share: on_progress(0.5 + share / 2)
@@ -147,7 +148,7 @@ def fit_mechanical_model(
     refuse_unsuitable(recordings)
     recordings, interpolation_remarks = interpolate_all(recordings)
     fit_segments, test_segments = split_fit_and_test(recordings)
-    fit_lines = [spectra for pair in fit_segments if (spectra := compute_segment_lines(*pair)) is not None]
+    fit_lines = compute_all_lines(fit_segments)
     segments = select_band(fit_lines, settings.band_hz)
     band_hz = _find_covered_band(segments)
     groups = build_line_groups(segments, settings.floor)
@@ -156,9 +157,9 @@ def fit_mechanical_model(
     starts = _fit_rigid_starts(segments, thinned_groups, structure, band_hz, settings)
     choice = choose_structure(thinned_groups, starts, band_hz, settings, on_progress)
     full_groups = [group.select_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
-    final = _refit(_include_all_lines(full_groups), choice.best, band_hz)
+    final = _refit(_include_all_lines(full_groups), choice.best, band_hz, settings.time_left())
     refuse_unstable(final)
-    test_lines = [spectra for pair in test_segments if (spectra := compute_segment_lines(*pair)) is not None]
+    test_lines = compute_all_lines(test_segments)
     on_progress(1.0)
     model = replace(make_physical_model(final, name), units=find_unit_system(recordings[0]))
     errors = _compute_channel_errors(model, fit_lines, test_lines, band_hz, recordings[0].response.channels)
@@ -171,10 +172,7 @@ def fit_mechanical_model(
         band_hz=band_hz,
         candidates=choice.candidates,
         reason=choice.reason,
-        remarks=(
-            *_list_remarks(final, recordings[0].response.channels, bool(test_lines)),
-            *interpolation_remarks,
-        ),
+        remarks=(*_list_remarks(final, recordings[0].response.channels, bool(test_lines)), *interpolation_remarks),
     )
 
 
@@ -217,6 +215,8 @@ def _fit_rigid_starts(
     ]
     part_ends_hz = [band_hz[0] * (stage_end_hz / band_hz[0]) ** share for share in _BAND_SHARES]
     for end_hz in (*part_ends_hz, band_hz[1]):
+        if fits and not settings.time_left():
+            break
         low_segments = select_band(segments, (band_hz[0], end_hz))
         line_count = sum(len(segment.frequency_hz) for segment in low_segments)
         if line_count < _MIN_LINES * structure.inputs and (fits or end_hz < part_ends_hz[-1]):
@@ -243,6 +243,7 @@ def _make_rigid_structure(
         step_s=1 / recording.sample_rate_hz,
         sensor=settings.sensor,
         actuator=settings.actuator,
+        grounded=settings.grounded,
         rotational=recording.is_rotational,
     )
 
@@ -262,13 +263,16 @@ def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
 
 
 def _refit(
-    groups: Sequence[LineGroup], best: RefinedFit[Structure] | RefinedFit[ModalStructure], band_hz: tuple[float, float]
+    groups: Sequence[LineGroup],
+    best: RefinedFit[Structure] | RefinedFit[ModalStructure],
+    band_hz: tuple[float, float],
+    has_time_left: bool,
 ) -> RefinedFit[Structure] | RefinedFit[ModalStructure]:
-    """Fit the chosen structure to all lines, from the parameters of the search. Modes with free shapes take at most 6
-    evaluations (chosen), because the search has refined them."""
+    """Fit the chosen structure to all lines, from the parameters of the search. Modes with free shapes, which the
+    search has refined, and any structure after the time limit take at most 6 evaluations (chosen)."""
     if isinstance(best.structure, ModalStructure):
         return balance_fit(refine_unknowns(groups, best.structure, best.unknowns, band_hz, max_evaluations=6))
-    return refine_unknowns(groups, best.structure, best.unknowns, band_hz)
+    return refine_unknowns(groups, best.structure, best.unknowns, band_hz, 40 if has_time_left else 6)
 
 
 def _include_all_lines(groups: Sequence[LineGroup]) -> list[LineGroup]:

@@ -1,5 +1,6 @@
 """Data classes of the fit of a mechanical model (`mechanical_fit`): settings, errors, compared structures, result."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
@@ -32,9 +33,13 @@ class MechanicalFitSettings:
     where that is known of the device; `noncollocated_sensors` is then ignored."""
     fit_delay: bool = True
     """Whether a delay is added where it lowers the cross-validated error."""
+    grounded: bool = True
+    """Whether springs to the ground may be fitted: not where all shafts turn freely."""
     floor: float = 0.02
     """Expected error of a linear model of a real device, as a share of a line's magnitude; it limits the weight of
     strong lines in the fit. Chosen."""
+    time_left: Callable[[], bool] = lambda: True
+    """Time limit: where it returns False, no further structure is fitted, and the best so far is the result."""
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:

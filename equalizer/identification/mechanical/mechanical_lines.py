@@ -1,8 +1,8 @@
 """Spectra of commands and responses, segment by segment, with their noise: the data of a mechanical fit.
 
 A periodic segment gives the mean spectrum of its periods: noise, including noise that a feedback adds to the command,
-averages out. Any other segment gives the spectrum of its longest run without gaps; the transient from the states at its
-ends is fitted with the model. Spectra are rfft / length, in the signals' units.
+averages out. Any other segment gives a spectrum of each of its runs without gaps (`compute_all_lines`); the transient
+from the states at the ends of a run is fitted with the model. Spectra are rfft / length, in the signals' units.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from equalizer.identification.frequency_response.noise_floor import compute_period_variance, smooth_over_lines
 from equalizer.signals.recording import Hold, Recording, Segment, list_segments
-from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray
+from equalizer.signals.signal import BoolArray, ComplexArray, FloatArray, find_runs
 from equalizer.signals.spectral_density import compute_line_spectra
 
 _RESIDUAL_FREEDOM = 8
@@ -72,6 +72,9 @@ SMOOTHING_LINES = 9
 """Number of lines over which the noise power between periods and, with a transient, the excitation power are averaged.
 Chosen."""
 
+LEAST_RUN_SHARE, MOST_RUNS = 0.5, 16
+"""Least length of a run between gaps, relative to the longest of its segment, and most runs of a segment, the longest
+ones: each needs an initial state of its own. Chosen."""
 TAPER_POWER = 0.5
 """Mean square of a sine window: the share of a steady signal's power that it leaves."""
 
@@ -94,6 +97,32 @@ class SegmentLines:
     """Whether the spectra contain a transient, from different states at the two ends."""
     rate_hz: float
     hold: Hold
+
+
+def compute_all_lines(driven_segments: Sequence[tuple[Recording, Segment]]) -> list[SegmentLines]:
+    """Compute the spectra of driven segments, without those that are not excited (`compute_segment_lines`). A segment
+    without a complete period gives a spectrum for each run that its gaps divide it into (`_list_runs`)."""
+    return [
+        lines
+        for recording, segment in driven_segments
+        for run in _list_runs(recording, segment)
+        if (lines := compute_segment_lines(recording, run)) is not None
+    ]
+
+
+def _list_runs(recording: Recording, segment: Segment) -> list[Segment]:
+    """List the runs of complete samples of a segment, as segments: the longest `MOST_RUNS` of at least
+    `LEAST_RUN_SHARE` of the length of the longest. The segment itself where it has a complete period."""
+    starts, longest = _find_whole_periods(recording, segment)
+    if not starts or longest == segment.period:
+        return [segment]
+    is_complete = _find_complete_samples(recording)[segment.start : segment.stop]
+    runs = sorted(find_runs(is_complete), key=lambda run: run[0] - run[1])[:MOST_RUNS]
+    return [
+        replace(segment, start=segment.start + start, stop=segment.start + stop)
+        for start, stop in sorted(runs)
+        if stop - start >= LEAST_RUN_SHARE * longest
+    ]
 
 
 def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
@@ -234,10 +263,7 @@ def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[in
     """Find start samples and common length of the complete periods, without the segment's first period where there are
     others; without a complete period, or for a period of fewer than eight samples, start and length of the longest run
     of samples without gaps. Lists no start where every sample is missing."""
-    signals = [recording.command.samples, recording.response.samples]
-    if recording.excitation is not None:
-        signals.append(recording.excitation.samples)
-    is_complete = np.all([np.isfinite(samples).all(axis=1) for samples in signals], axis=0)
+    is_complete = _find_complete_samples(recording)
     if segment.period >= 8:
         starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
         complete_starts = [start for start in starts if is_complete[start : start + segment.period].all()]
@@ -248,6 +274,14 @@ def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[in
     longest_run = int(np.argmax(np.diff(gap_indices)))
     start, length = segment.start + int(gap_indices[longest_run]), int(np.diff(gap_indices)[longest_run]) - 1
     return ([start] if length > 0 else []), length
+
+
+def _find_complete_samples(recording: Recording) -> BoolArray:
+    """Find (n,): whether command, response and, where it was recorded, excitation have no missing value."""
+    signals = [recording.command.samples, recording.response.samples]
+    if recording.excitation is not None:
+        signals.append(recording.excitation.samples)
+    return np.asarray(np.all([np.isfinite(samples).all(axis=1) for samples in signals], axis=0))
 
 
 def _compute_spectra(samples: FloatArray, starts: Sequence[int], length: int, tapered: bool = False) -> ComplexArray:

@@ -38,6 +38,8 @@ TARGET_REACHED = (
 )
 """Reason for the end of growth where the error on held-out lines is below `TARGET_ERROR` (in `modal_order`: below
 1)."""
+OUT_OF_TIME = "The time limit was reached: further terms were not tried."
+"""Reason for the end of growth where no time is left."""
 JOINT_START_RATIOS = (1.1, 1.6)
 """Starting frequencies of the joint's resonance, relative to the band's upper end."""
 
@@ -52,6 +54,8 @@ class _Limits:
     """Whether a delay is tried."""
     extend_couplings: bool
     """Whether a structure with several inputs may get a delay, a sensor rotation and shared sensors."""
+    time_left: Callable[[], bool]
+    """`MechanicalFitSettings.time_left`."""
 
 
 def grow_by_stages(
@@ -69,6 +73,8 @@ def grow_by_stages(
     upper_ends_hz = compute_stage_ends(band_hz)
     for stage, upper_hz in enumerate(upper_ends_hz):
         on_progress(0.9 * stage / len(upper_ends_hz))
+        if not settings.time_left():
+            return best, tuple(trials), OUT_OF_TIME
         stage_band_hz = (band_hz[0], upper_hz)
         lower_groups = [
             part for group in groups if len((part := group.select_lines(group.frequency_hz <= upper_hz)).frequency_hz)
@@ -81,7 +87,7 @@ def grow_by_stages(
             lower_groups,
             best,
             stage_band_hz,
-            _Limits(settings.most_modes, settings.fit_delay, extend_couplings and is_last),
+            _Limits(settings.most_modes, settings.fit_delay, extend_couplings and is_last, settings.time_left),
             trials,
         )
     return best, tuple(trials), reason
@@ -131,6 +137,8 @@ def _grow_structure(
                 best = extended_fit
                 break
         else:
+            if not limits.time_left():
+                return best, OUT_OF_TIME
             is_full = best.structure.modes >= limits.most_modes
             prefix = f"{limits.most_modes} modes, the most that are allowed, are used, and n" if is_full else "N"
             return best, (
@@ -175,7 +183,7 @@ def grow_across_joint(
         groups,
         with_joint,
         band_hz,
-        _Limits(settings.most_modes, fit_delay=False, extend_couplings=False),
+        _Limits(settings.most_modes, False, False, settings.time_left),
         trials,
     )
     return final, tuple(trials), reason
@@ -224,8 +232,11 @@ def _fit_extensions(
     """Fit extended structures, each with its description: with a further mode, then with another extension, last with a
     mode and shared sensors together."""
     structure = current.structure
-    starts = estimate_mode_starts(groups, current, band_hz) if structure.modes < limits.most_modes else ()
+    may_add_mode = structure.modes < limits.most_modes and limits.time_left()
+    starts = estimate_mode_starts(groups, current, band_hz) if may_add_mode else ()
     for start in starts:
+        if not limits.time_left():
+            return
         description = f"with a mode begun at {start.frequency_hz:.3g} Hz ({start.structure.modes} in all)"
         yield description, refine_unknowns(groups, start.structure, start.unknowns, band_hz)
     # Couplings between axes are identifiable only once all modes are included.
@@ -239,11 +250,13 @@ def _fit_extensions(
     if structure.inputs > 1 and not structure.rotated_sensor:
         extensions.append(("with a turned sensor", replace(structure, rotated_sensor=True)))
     for description, extended in extensions:
+        if not limits.time_left():
+            return
         yield (
             description,
             refine_unknowns(groups, extended, structure.convert_unknowns(current.unknowns, extended), band_hz),
         )
-    for start in () if structure.shared_sensors else starts[:1]:
+    for start in () if structure.shared_sensors or not limits.time_left() else starts[:1]:
         extended = replace(start.structure, shared_sensors=True)
         unknowns = start.structure.convert_unknowns(start.unknowns, extended)
         description = f"with a mode begun at {start.frequency_hz:.3g} Hz that the sensors see ({extended.modes} in all)"

@@ -5,8 +5,9 @@ the weighted spectra), with SciPy's bounded trust-region reflective method. Held
 result. Called by `mechanical_fit` and the selection of the order (`mechanical_order`, `modal_order`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -64,16 +65,7 @@ def refine_unknowns(
     lower_bounds, upper_bounds = structure.compute_bounds(band_hz)
 
     start = np.clip(start, lower_bounds + 1e-9, upper_bounds - 1e-9)
-    start_residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(start)))
-
-    def compute_residuals(unknowns: FloatArray) -> FloatArray:
-        """Compute the real residuals on the fitted lines; 1e6 each for an invalid model or non-finite residuals."""
-        try:
-            residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(unknowns)))
-        except (np.linalg.LinAlgError, MechanicalModelError):
-            return np.full_like(start_residuals, 1e6)  # so that the step to an invalid model is rejected
-        return residuals if np.isfinite(residuals).all() else np.full_like(start_residuals, 1e6)
-
+    compute_residuals = _make_residuals(fitted_groups, structure, start)
     solution = least_squares(
         compute_residuals,
         start,
@@ -89,6 +81,25 @@ def refine_unknowns(
     )
     held_out_squares, held_out_count = _sum_held_out_squares(groups, structure.build_model(solution.x))
     return RefinedFit(structure, solution.x, 2 * float(solution.cost), held_out_squares, held_out_count, solution.jac)
+
+
+def _make_residuals(
+    groups: Sequence[LineGroup], structure: Structure | ModalStructure, start: FloatArray
+) -> Callable[[FloatArray], FloatArray]:
+    """Make the function from unknowns (parameters,) to the real residuals on all lines; 1e6 each for an invalid model
+    or non-finite residuals. It remembers the last: the optimiser asks for a Jacobian where it has just evaluated them.
+    Raises as `refine_unknowns` for the start."""
+    rejected = np.full_like(stack_real(compute_misfits(groups, structure.build_model(start))), 1e6)
+
+    @lru_cache(maxsize=1)
+    def evaluate(unknown_bytes: bytes) -> FloatArray:
+        try:
+            residuals = stack_real(compute_misfits(groups, structure.build_model(np.frombuffer(unknown_bytes))))
+        except (np.linalg.LinAlgError, MechanicalModelError):
+            return rejected  # so that the step to an invalid model is rejected
+        return residuals if np.isfinite(residuals).all() else rejected
+
+    return lambda unknowns: evaluate(unknowns.tobytes())
 
 
 def _sum_held_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:

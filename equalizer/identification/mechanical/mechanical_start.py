@@ -193,7 +193,7 @@ def _compute_weights(spectra: SegmentLines, m: int, floor: float, force_noise: F
 
 def list_triangle_pairs(m: int) -> list[tuple[int, int]]:
     """List row and column of the m (m + 1) / 2 entries of a lower triangle, row by row."""
-    return list(zip(*(indices.tolist() for indices in np.tril_indices(m)), strict=True))
+    return [(row, column) for row in range(m) for column in range(row + 1)]
 
 
 def _compute_entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings, OrderCandidate
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup
-from equalizer.identification.mechanical.mechanical_order import TARGET_REACHED
+from equalizer.identification.mechanical.mechanical_order import OUT_OF_TIME, TARGET_REACHED
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_search import ModalSearch, ModeEstimate
@@ -47,11 +47,12 @@ def choose_modes(
         structure,
         most_modes,
         lambda share: on_progress(0.4 * share),
+        settings.time_left,
     )
-    if settings.fit_delay and _compute_held_out_error(best) >= DELAY_ERROR:
+    if settings.fit_delay and settings.time_left() and _compute_held_out_error(best) >= DELAY_ERROR:
         search = ModalSearch(groups, structure, band_hz, fit_delay=True)
         delayed_estimate, delayed_trials, delayed_reason = _add_modes(
-            search, structure, most_modes, lambda share: on_progress(0.4 + 0.4 * share)
+            search, structure, most_modes, lambda share: on_progress(0.4 + 0.4 * share), settings.time_left
         )
         trials = [
             *trials,
@@ -72,7 +73,11 @@ def choose_modes(
 
 
 def _add_modes(
-    search: ModalSearch, structure: Structure, most_modes: int, on_progress: Callable[[float], None]
+    search: ModalSearch,
+    structure: Structure,
+    most_modes: int,
+    on_progress: Callable[[float], None],
+    time_left: Callable[[], bool],
 ) -> tuple[ModeEstimate, list[OrderCandidate], str]:
     """Add modes, up to `most_modes`, while the error on held-out lines falls enough. Returns the estimate, the orders
     tried, and the reason for the end."""
@@ -82,6 +87,8 @@ def _add_modes(
         on_progress(number / most_modes)
         if _compute_held_out_error(best) < 1:
             return best, trials, TARGET_REACHED
+        if not time_left():
+            return best, trials, OUT_OF_TIME
         extended = search.add_mode(best)
         is_accepted = extended.held_out_squares < (1 - LEAST_GAIN) * best.held_out_squares
         trials.append(_record_trial(extended, structure, is_accepted))

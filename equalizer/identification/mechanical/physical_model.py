@@ -78,12 +78,13 @@ def _list_axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
 def _compute_covariance(fit: AnyFit) -> FloatArray:
     """Compute the covariance of the unknowns (parameters, parameters). Columns of the Jacobian are scaled to length 1;
     the pseudo-inverse truncates directions that the data do not determine (singular values of J'J below 1e-10 of the
-    largest)."""
+    largest), as of an unknown on which no line depends."""
     jacobian = fit.jacobian
-    column_norms = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    column_norms = np.linalg.norm(jacobian, axis=0)
+    column_norms = np.where(column_norms > 0, column_norms, np.inf)
     inverse = np.linalg.pinv((jacobian / column_norms).T @ (jacobian / column_norms), rcond=1e-10)
     residual_variance = fit.squares / max(len(jacobian) - jacobian.shape[1], 1)
-    return np.asarray(residual_variance * inverse / np.outer(column_norms, column_norms))
+    return np.asarray(residual_variance * inverse / column_norms / column_norms[:, None])
 
 
 def _convert_to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:

@@ -7,17 +7,15 @@ Steps: read the input, take or fit the model to compare with, add the virtual sp
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
-
-import numpy as np
 
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.first_model.first_model import FirstModel
-from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
@@ -31,7 +29,7 @@ from study.store.disk.new_folder import create_new_folder, require_new_folder
 from study.workflows.crash_guard import make_crash_guard
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
-    make_not_diagnosable_error,
+    convert_refusals,
     read_given_model,
     read_input,
 )
@@ -126,7 +124,8 @@ def run_diagnosis(plan: DiagnosePlan, on_progress: Progress, engine: Engine = di
     file_laws = _read_effect_laws(plan.effect_files, inputs.recordings)
     on_progress("reading", READ_SHARE)
     has_time_left, guard = _start_time_budget(plan), make_crash_guard()
-    first_model = _choose_model(plan, inputs, clean, (has_time_left, guard), on_progress)
+    # Half of the time for a first model with its force balance, so that the search has as much. Chosen.
+    first_model = _choose_model(plan, inputs, clean, (_start_time_budget(plan, 0.5), guard), on_progress)
     # A model that was fitted to these recordings already contains the spring.
     spring_n_per_m = inputs.spring_n_per_m if plan.model is not None or inputs.simulated else 0.0
     model = add_spring(first_model.model, spring_n_per_m)
@@ -135,19 +134,10 @@ def run_diagnosis(plan: DiagnosePlan, on_progress: Progress, engine: Engine = di
     settings = replace(
         _make_settings(plan, inputs, clean, first_model.balances), time_left=has_time_left, guard=guard, kept=file_laws
     )
-    try:
+    with convert_refusals(has_model=plan.model is not None):
         findings = engine(
             inputs.recordings, model, settings, map_forked, _scale_progress(on_progress, start_share, DIAGNOSED_SHARE)
         )
-    except IncomparableRecordingsError as refusal:
-        raise make_not_diagnosable_error(
-            (str(refusal),), "Leave --clean out, or record the device in order in the same way."
-        ) from refusal
-    except np.linalg.LinAlgError as error:
-        raise make_not_diagnosable_error(
-            (f"The fits broke down ({error}): near the given parameters the simulation diverges",),
-            "State narrower tolerances in the model, or give one that is nearer to the device.",
-        ) from error
     first_remarks = first_model.list_remarks(findings.given, findings.diagnosis.error)
     findings = replace(
         findings,
@@ -187,10 +177,10 @@ def write_result_folder(diagnosis: UnwrittenDiagnosis, on_progress: Progress) ->
     return DiagnosedRecordings(findings, plan.out)
 
 
-def _start_time_budget(plan: DiagnosePlan) -> TimeBudget:
-    """Make the test whether processor time is left, counted from now; always True without a limit."""
+def _start_time_budget(plan: DiagnosePlan, share: float = 1.0) -> TimeBudget:
+    """Make the test whether this share of the processor time is left, counted from now; always True without a limit."""
     start_s = measure_processor_s()
-    return lambda: plan.seconds is None or measure_processor_s() - start_s < plan.seconds
+    return lambda: plan.seconds is None or measure_processor_s() - start_s < share * plan.seconds
 
 
 def _make_settings(
@@ -246,7 +236,7 @@ def _choose_model(
     plan: DiagnosePlan,
     inputs: DiagnosisInput,
     clean: DiagnosisInput | None,
-    time_budget_and_guard: tuple[TimeBudget, Guard],
+    limits: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
     """Choose the model to compare with: the given one; for a session on the simulated device, its twin; with clean
@@ -260,21 +250,19 @@ def _choose_model(
     from study.workflows.diagnosis.fit_without_model import fit_first_model, fit_linear_model
 
     if clean is None:
-        return fit_first_model(inputs, plan.excluded_effects, time_budget_and_guard, fit_progress, plan.discovery)
+        return fit_first_model(inputs, plan.excluded_effects, limits, fit_progress, plan.discovery)
     step = "fitting a linear model, as none was given"
     on_progress(step, READ_SHARE)
-    return FirstModel(*fit_linear_model(clean, lambda share: fit_progress(step, share), "the clean recordings"))
+    return FirstModel(*fit_linear_model(clean, partial(fit_progress, step), "the clean recordings", limits[0]))
 
 
 def _identify_twin(on_progress: Progress) -> MechanicalModel:
     """Identify a linear model of the simulated device; its file is temporary."""
     from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 
-    step = "identifying the simulated device's twin"
-    on_progress(step, 0.0)
+    on_progress(step := "identifying the simulated device's twin", 0.0)
     with tempfile.TemporaryDirectory() as folder:
-        plan = TwinPlan(Path(folder) / "twin.toml")
-        return write_twin(plan, lambda share: on_progress(step, share)).model
+        return write_twin(TwinPlan(Path(folder) / "twin.toml"), lambda share: on_progress(step, share)).model
 
 
 def _scale_progress(on_progress: Progress, start_share: float, end_share: float) -> Callable[[str, float], None]:

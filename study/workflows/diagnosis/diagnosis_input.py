@@ -4,12 +4,16 @@ Recordings are checked for consistent channels, units and rates, converted to fo
 and brought into the form in which they can be compared.
 """
 
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_comparable, require_model_of
+from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from analysis.diagnosis.prepare_recordings import prepare_comparison, prepare_recordings
 from analysis.wording import begin_sentence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -122,6 +126,24 @@ def read_given_model(path: Path, diagnosis_input: DiagnosisInput) -> MechanicalM
             saved="Nothing was written.",
         ) from refusal
     return model
+
+
+@contextlib.contextmanager
+def convert_refusals(has_model: bool) -> Iterator[None]:
+    """Convert errors of the diagnosis to errors for the user. has_model: whether the user gave a model."""
+    try:
+        yield
+    except IncomparableRecordingsError as refusal:
+        raise make_not_diagnosable_error(
+            (str(refusal),), "Leave --clean out, or record the device in order in the same way."
+        ) from refusal
+    except np.linalg.LinAlgError as error:
+        raise make_not_diagnosable_error(
+            (f"The fits broke down ({error}): near the parameters of the model the simulation diverges",),
+            "State narrower tolerances in the model, or give one that is nearer to the device."
+            if has_model
+            else "Give a model with --model, or diagnose recordings that resemble each other more, each by itself.",
+        ) from error
 
 
 def make_not_diagnosable_error(problems: Sequence[str], advice: str = "Correct them, or record again.") -> StudyError:

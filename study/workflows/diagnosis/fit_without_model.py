@@ -44,17 +44,24 @@ def fit_first_model(
     with _translate_refusals():
         balance_model = guard.run(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnoseError,))
     return balance_model or FirstModel(
-        *fit_linear_model(diagnosis_input, lambda share: on_progress("fitting a linear model", share)), ()
+        *fit_linear_model(
+            diagnosis_input, lambda share: on_progress("fitting a linear model", share), time_left=has_time_left
+        ),
+        (),
     )
 
 
 def fit_linear_model(
-    diagnosis_input: DiagnosisInput, on_progress: Callable[[float], None], origin: str = "these recordings"
+    diagnosis_input: DiagnosisInput,
+    on_progress: Callable[[float], None],
+    origin: str = "these recordings",
+    time_left: TimeBudget = lambda: True,
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """Fit a linear model to forces or spectra. Returns the model and remarks. on_progress: called with the completed
-    share, 0 to 1. origin: of the recordings, for the model's name. Raises StudyError for unsuitable recordings."""
+    share, 0 to 1. origin: of the recordings, for the model's name. time_left: time limit of the fit. Raises StudyError
+    for unsuitable recordings."""
     with _translate_refusals():
-        return fit_without_model.fit_first_linear_model(diagnosis_input.recordings, on_progress, origin)
+        return fit_without_model.fit_first_linear_model(diagnosis_input.recordings, on_progress, origin, time_left)
 
 
 @contextmanager

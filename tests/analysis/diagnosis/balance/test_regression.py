@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.blocks import solve_ridge
 from analysis.diagnosis.balance.change_laws import copy_columns, keep_laws, overwrite_law, try_law
 from analysis.diagnosis.balance.laws.law import Law, name_weights
 from analysis.diagnosis.balance.motion import compute_motions
-from analysis.diagnosis.balance.regression import build_regression, fit_all_laws
-from analysis.diagnosis.balance.structures import Structure, improves_significantly
+from analysis.diagnosis.balance.regression import MOST_RIDGE_FOLDS, build_regression, fit_all_laws, make_law_columns
+from analysis.diagnosis.balance.structures import Structure, improves_significantly, search_structures
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.limits import BALANCE_FOLDS
 
@@ -71,6 +72,9 @@ def test_a_folds_error_is_that_of_numbers_fitted_to_all_others(regression):
         for block in regression.fit
     ]
     assert found.sum() > sum(own)
+    sums = [regression.select_columns(laws) for laws in ((1,), (2,), (0, 1), (0,))] * 7  # of three lengths
+    for selection, errors in zip(sums, regression.cross_validate_each(sums), strict=True):
+        assert errors.tolist() == regression.cross_validate(selection).tolist()
 
 
 def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
@@ -126,6 +130,32 @@ def test_all_laws_together_leave_no_more_than_the_truth_and_noise_alone_stays(re
     assert crossed == pytest.approx(truth, rel=0.05)
     assert crossed < 0.7 * regression.cross_validate(regression.select_columns(())).sum()
     assert tested.shape == (len(regression.test),)
+
+
+def test_hundreds_of_short_parts_are_merged_to_a_few_folds(regression, monkeypatch):
+    everything, fold_counts = range(regression.columns[0].shape[1]), []
+
+    def count_folds(products, ridge, is_base):
+        fold_counts.append(len(np.atleast_2d(products[1])))
+        return solve_ridge(products, ridge, is_base)
+
+    monkeypatch.setattr("analysis.diagnosis.balance.regression.solve_ridge", count_folds)
+    error, tested = fit_all_laws(regression, everything)
+    repeated_error, repeated_tested = fit_all_laws(replace(regression, fit=regression.fit * 20), everything)
+    assert max(fold_counts) <= MOST_RIDGE_FOLDS < 20 * len(regression.fit)
+    assert repeated_error == pytest.approx(20 * error, rel=0.05)
+    assert repeated_tested == pytest.approx(tested, rel=1e-3)
+
+
+def test_columns_of_parts_of_one_length_are_those_of_each_part(regression):
+    motions = [*regression.motions, replace(regression.motions[0], force=2 * regression.motions[0].force)]
+    for columns, motion in zip(make_law_columns(motions, PAIR), motions, strict=True):
+        np.testing.assert_array_equal(columns, motion.decimate(PAIR.make_columns(motion, ())))
+
+
+def test_without_time_left_only_the_base_is_fitted(regression):
+    search = search_structures(regression.motions, 0, False, frozenset(), lambda: False)
+    assert not search.complete and search.regression.laws == () and search.best.laws == ()
 
 
 def test_an_axis_has_no_mass_and_no_damping_below_zero(regression):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from equalizer.signals.recording import Hold
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
@@ -112,7 +113,8 @@ def test_a_loop_without_time_tells_which_way_a_force_is_counted(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_a_command_that_moves_nothing_and_a_spring_alone_are_left_as_they_are(seed):
     push = smooth_noise(2000, seed)
-    for moved in (smooth_noise(2000, seed + 100), -push):
+    noise = 1e-3 * np.random.default_rng(seed).standard_normal(2000)  # without it, the force follows from the reading
+    for moved in (smooth_noise(2000, seed + 100), noise - push):
         recording = make_recording([("u", "force", "N", push)], [("x", "position", "m", moved)])
         assert convert_to_driven_motions((recording,)) == ((recording,), ())
 
@@ -136,3 +138,35 @@ def test_of_an_imposed_motion_the_measured_force_is_turned_round():
 
     (found,), _ = convert_to_driven_motions((recording,))
     np.testing.assert_array_equal(found.response.samples[:, 0], push)
+
+
+def move_by_hand(spring, damper, decided, stiffness=0.0):
+    """(n,) command and position: of a body that a hand moves, with a virtual spring and damper and a decided force."""
+    hand, place, speed, before, mass = smooth_noise(4000, 2, width=100), 0.0, 0.0, 0.0, 0.05
+    commands, places = [], []
+    for push, force in zip(hand, decided, strict=True):
+        command = force - spring * place - damper * (place - before) * RATE_HZ
+        commands.append(command)
+        places.append(place)
+        before = place
+        for _ in range(10):
+            speed += (command + push - 0.5 * speed - stiffness * place) / mass / RATE_HZ / 10
+            place += speed / RATE_HZ / 10
+    return np.array(commands), np.array(places)
+
+
+@pytest.mark.parametrize(("spring", "damper"), [(20.0, 0.0), (20.0, 0.5), (0.0, 1.0)])
+def test_a_virtual_spring_under_a_hand_is_not_taken_for_the_device(spring, damper):
+    command, place = move_by_hand(spring, damper, np.zeros(4000))
+    recording = make_recording([("u", "force", "N", command)], [("x", "position", "m", place)])
+
+    with pytest.raises(NothingToDiagnoseError, match="u only resists the measured position and speed"):
+        convert_to_driven_motions((recording,))
+
+
+@pytest.mark.parametrize("stiffness", [0.0, -15.0], ids=["free body", "upside-down pendulum"])
+def test_a_device_under_feedback_with_an_excitation_of_its_own_is_kept(stiffness):
+    command, place = move_by_hand(20.0, 0.5, 3 * smooth_noise(4000, 3), stiffness)
+    recording = make_recording([("u", "force", "N", command)], [("x", "position", "m", place)])
+
+    assert convert_to_driven_motions((recording,)) == ((recording,), ())

@@ -69,6 +69,27 @@ def test_two_commands_of_one_motion_become_one():
     assert "one command was made of them" in said
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_virtual_spring_and_the_hand_on_it_are_summed_as_their_unit_says(seed):
+    """No gain of a command that is computed from the motion follows from the motion."""
+    hand, speed, place, virtual, places = smooth_noise(4000, seed), 0.0, 0.0, [], []
+    for push in hand:
+        virtual.append(-20 * place)
+        places.append(place)
+        for _ in range(10):
+            speed += (push + virtual[-1] - 0.3 * speed - 0.1 * np.tanh(100 * speed)) / 0.05 / RATE_HZ / 10
+            place += speed / RATE_HZ / 10
+    measured = np.array(places) + 1e-5 * np.random.default_rng(seed).standard_normal(4000)
+    recording = make_recording(
+        [("virtual", "force", "N", np.array(virtual)), ("hand", "force", "N", hand)],
+        [("x", "position", "m", measured)],
+    )
+
+    (found,), _ = convert_to_driven_motions((recording,))
+
+    np.testing.assert_allclose(found.command.samples[:, 0], np.array(virtual) + hand)
+
+
 @pytest.mark.parametrize("level", [0.0, 0.5, 50.0])
 def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(level):
     first, second = smooth_noise(4000, 1), smooth_noise(4000, 2)

@@ -249,6 +249,7 @@ def test_a_black_box_that_beats_the_physics_is_said_to(test, physics, end):
     said = describe_black_box(BlackBox("ARX", 12, test, physics), is_effect_named=True)
     assert said.startswith("A black box (ARX, 12 parameters), fitted to the same samples, has an error of")
     assert said.endswith(end)
+    assert "(ARX, 1 parameter), fitted" in describe_black_box(BlackBox("ARX", 1, test, physics), is_effect_named=True)
     assert "the re-tuned model has" in describe_black_box(BlackBox("ARX", 12, test, physics), is_effect_named=False)
 
 

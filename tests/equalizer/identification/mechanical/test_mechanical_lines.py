@@ -9,6 +9,7 @@ from equalizer.identification.frequency_response.experiments import collect_wind
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings
 from equalizer.identification.mechanical.mechanical_lines import (
+    compute_all_lines,
     compute_segment_lines,
     have_same_lines,
     select_band,
@@ -17,7 +18,7 @@ from equalizer.identification.mechanical.mechanical_lines import (
 )
 from equalizer.identification.mechanical.mechanical_misfit import add_scatter_noise
 from equalizer.signals.recording import Segment
-from tests.equalizer.identification.mechanical.test_mechanical_fit import multisine, recording, stepped
+from tests.equalizer.identification.mechanical.test_mechanical_fit import RATE_HZ, multisine, recording, stepped
 
 
 def test_only_complete_periods_after_the_first_are_without_a_transient():
@@ -34,6 +35,35 @@ def test_only_complete_periods_after_the_first_are_without_a_transient():
     assert not has_transient([100, 1100])  # the last period is complete
     assert has_transient([1100, 2100])  # only the first is
     assert has_transient([100, 1900, 2950])  # none is: the longest run begins within the first
+
+
+def test_gaps_divide_a_segment_without_whole_periods_into_runs():
+    command = np.random.default_rng(4).standard_normal((3000, 1))
+    response = command.copy()
+    response[[1000, 1001, 1800, 2500]] = np.nan
+    gappy = recording(command, response)
+
+    def count_lines(segment):
+        return [len(lines.frequency_hz) for lines in compute_all_lines([(gappy, segment)])]
+
+    assert count_lines(Segment(0, 3000, "noise")) == [499, 398, 349]  # the run of 499 samples is too short
+    assert count_lines(Segment(0, 3000, "multisine", 1.0, 600)) == [299]  # two periods are complete: their mean
+    assert count_lines(Segment(1100, 1700, "noise")) == [299]
+
+
+def test_a_device_that_lost_samples_now_and_then_is_fitted_to_all_of_its_tones():
+    """A few samples are missing after each tone: a single run would hold one tone, which many models explain."""
+    tones_hz = (3.0, 11.0, 1.5, 6.0, 18.0)
+    command = np.concatenate([np.sin(2 * np.pi * f * np.arange(2000) / RATE_HZ) for f in tones_hz])[:, None]
+    eye = np.eye(1)
+    response = stepped(0.3 * eye, 4.0 * eye, 900.0 * eye, eye, eye, "velocity", command)
+    response += 1e-3 * response.std() * np.random.default_rng(5).standard_normal(response.shape)
+    for start in range(2000, len(response), 2000):
+        response[start : start + 4] = np.nan
+    fit = fit_mechanical_model(recording(command, response, "velocity"))
+    values = [float(matrix[0, 0]) for matrix in (fit.model.mass, fit.model.damping, fit.model.stiffness)]
+    assert values == pytest.approx([0.3, 4.0, 900.0], rel=0.02)
+    assert fit.held_out is not None and fit.held_out < 0.02
 
 
 def test_where_all_segments_are_marked_as_test_the_marks_are_ignored():

@@ -8,7 +8,11 @@ import pytest
 
 from analysis.diagnosis.errors.prediction_error import compute_prediction_error
 from analysis.diagnosis.first_model.choose_structure import choose_structure
-from analysis.diagnosis.first_model.fit_without_model import _responds_to_commands
+from analysis.diagnosis.first_model.fit_without_model import (
+    FIT_OUT_OF_TIME,
+    _responds_to_commands,
+    fit_first_linear_model,
+)
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
@@ -17,6 +21,8 @@ from study.cli.main import main
 from study.errors import StudyError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
+from study.workflows.diagnosis import diagnose_recordings
+from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan
 from study.workflows.diagnosis.diagnosis_input import read_given_model, read_input
 from study.workflows.diagnosis.fit_first_model import FirstModelPlan, FittedFirstModel, fit_and_write_first_model
 
@@ -235,3 +241,27 @@ def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_
     assert any(
         "The recording does not state what x measures; it was taken for a position" in remark for remark in done.remarks
     )
+
+
+def test_the_first_model_of_a_diagnosis_ends_within_half_of_the_time_and_says_so(tmp_path, monkeypatch):
+    source = recorded(device(0.4, 6.0, 900.0, "acceleration"))
+    whole, cut = (
+        fit_first_linear_model([source], lambda share: None, time_left=is_left)
+        for is_left in (lambda: True, lambda: False)
+    )
+    assert FIT_OUT_OF_TIME not in whole[1] and FIT_OUT_OF_TIME in cut[1]
+    assert cut[0].mass[0, 0] == pytest.approx(0.4, rel=0.05)
+
+    def fit_and_stop(inputs, excluded, limits, *further):
+        with monkeypatch.context() as clock:
+            seconds = iter([9.0, 11.0])
+            start_s = diagnose_recordings.measure_processor_s()
+            clock.setattr(diagnose_recordings, "measure_processor_s", lambda: start_s + next(seconds))
+            raise StudyError(str([limits[0](), limits[0]()]), "", "")
+
+    monkeypatch.setattr("study.workflows.diagnosis.fit_without_model.fit_first_model", fit_and_stop)
+    write_recording(tmp_path / "rec.h5", source)
+    with pytest.raises(StudyError, match=r"True, False"):
+        diagnose_recordings.run_diagnosis(
+            DiagnosePlan((tmp_path / "rec.h5",), tmp_path / "out", seconds=20.5), lambda step, share: None
+        )
