@@ -2,7 +2,8 @@
 
 The files are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
 memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; other cells, texts, objects,
-functions and sparse matrices are replaced by placeholders with their kind, a complex array by 0j. Format: MAT-File
+functions and sparse matrices are replaced by placeholders with their kind (a text by its beginning, because labels say
+what was measured), a complex array by 0j. Format: MAT-File
 Level 5, MathWorks, 2010.
 """
 
@@ -41,21 +42,32 @@ _CLASS_NUMBER_TYPES = {
 """NumPy type of a numeric array, by its array class in the MAT-file format."""
 _UNREAD_CLASSES = {_TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
 """Array classes that are not read, in words."""
+_TEXT_ENCODINGS = {2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+"""Encoding of the characters of a text, by its data type in the MAT-file format."""
+_MAX_QUOTED_CHARACTERS = 80
+"""Largest number of characters of a text that a description quotes. Chosen."""
 _CONVERSIONS = {
     "a cell": "{plain}_1 = {name}{{1}}",
-    "class timeseries": "{name} = struct('time', {name}.Time, 'values', {name}.Data)",
-    "class table": "{name} = table2struct({name}, 'ToScalar', true)",
+    "an object of the class timeseries": "{name} = struct('time', {name}.Time, 'values', {name}.Data)",
+    "an object of the class table": "{name} = table2struct({name}, 'ToScalar', true)",
 }
-"""Matlab statement that converts an array that is not read to a readable one, by a part of its description."""
+"""Matlab statement that converts an array that is not read to a readable one, by the beginning of its description."""
 
 
 def suggest_conversion(name: str, kind: str) -> str:
     """Suggest the Matlab statement that converts an array before it is saved; empty where none is known. kind: the
     description of its kind, from `find_unread_reason`."""
-    for pattern, statement in _CONVERSIONS.items():
-        if pattern in kind:
+    for beginning, statement in _CONVERSIONS.items():
+        if kind.startswith(beginning):
             return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
     return ""
+
+
+def describe_text(text: str) -> str:
+    """Describe an array that is a text by the beginning of its first line; "a text" where that is empty."""
+    line = "".join(character for character in text.strip().partition("\n")[0] if character.isprintable()).strip()
+    ending = " ..." if len(line) > _MAX_QUOTED_CHARACTERS else ""
+    return f"the text '{line[:_MAX_QUOTED_CHARACTERS]}{ending}'" if line else "a text"
 
 
 CELL_ENTRY_PREFIX = re.compile(r"\d+-of-\d+/")
@@ -161,6 +173,8 @@ def _read_matrix(element: _ElementReader, depth: int) -> tuple[str, Any]:
         return name, _read_structures(element, math.prod(shape), depth)
     if array_class == _CELL:
         return name, _read_cells(element, math.prod(shape), depth)
+    if array_class == _TEXT and shape[0] == 1 and element.remaining:
+        return name, _make_placeholder(describe_text(_read_text(element)))
     return name, _make_placeholder(_UNREAD_CLASSES.get(array_class, "no array"))
 
 
@@ -176,6 +190,16 @@ def _read_numeric(element: _ElementReader, shape: tuple[int, ...], number_type: 
     if math.prod(shape) != len(values) or min(shape, default=0) < 0:
         raise ValueError(f"an array of the shape {shape} has {len(values)} numbers")
     return values.astype(number_type).reshape(shape, order="F")
+
+
+def _read_text(element: _ElementReader) -> str:
+    """Read the characters of a text of a single row; empty where their encoding is unknown. Raises ValueError where it
+    is cut off."""
+    data_type, characters = element.read_element()
+    encoding = _TEXT_ENCODINGS.get(data_type, "")
+    if encoding.startswith("utf-") and encoding != "utf-8":
+        encoding += "-le" if element.byte_order == "<" else "-be"
+    return bytes(characters.content).decode(encoding, "replace") if encoding else ""
 
 
 def _read_structures(element: _ElementReader, structure_count: int, depth: int) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
+from study.importing.arrays.mat_arrays import describe_text
 from study.regular_file import open_regular
 from study.store.disk.declared_size import SizeLimit
 from study.store.disk.hdf5_contents import iterate_datasets
@@ -28,6 +29,8 @@ _OTHER_DESCRIPTION = (
     "of a type that is not read, such as rows of several columns; each column is read from a dataset of its own"
 )
 """Description of a dataset of compound, complex or other types."""
+_MAX_TEXT_CHARACTERS = 10_000
+"""Largest length of a Matlab text that is read to describe it. Chosen."""
 _NON_NUMERIC = np.array(None, dtype=object)
 """Placeholder for the values of HDF5 texts and objects that are listed but not read."""
 
@@ -141,4 +144,7 @@ def _describe_unread_class(entry: Any) -> str:
         return _CELL_DESCRIPTION
     if "MATLAB_object_decode" in entry.attrs:
         return f"an object of the class {matlab_class.decode('utf-8', 'replace')}"
-    return "a text" if matlab_class == b"char" else ""  # stored as the numbers of its characters
+    if matlab_class != b"char":
+        return ""
+    is_row = entry.ndim == 2 and entry.shape[1] == 1 and entry.dtype.kind == "u" and entry.size < _MAX_TEXT_CHARACTERS
+    return describe_text("".join(map(chr, entry[:, 0])) if is_row else "")  # stored as the numbers of its characters

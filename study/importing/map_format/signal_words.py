@@ -57,7 +57,8 @@ _CERTAIN_UNITS = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
 _JOINED_UNITS = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 """Units as written in names, without blanks or slashes, and their usual notation."""
 _ROLE_BY_WORD: dict[str, SignalRole] = {
-    **dict.fromkeys(("command", "cmd", "commanded", "comando", "mando", "befehl", "commande"), "command"),
+    **dict.fromkeys(("command", "cmd", "commanded", "demand", "demanded"), "command"),
+    **dict.fromkeys(("comando", "mando", "befehl", "commande"), "command"),
     **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
     **dict.fromkeys(("referencia", "sollwert", "consigne"), "helper"),
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),

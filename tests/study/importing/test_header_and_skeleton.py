@@ -226,6 +226,7 @@ def test_a_proposal_for_several_runs_needs_a_device_and_no_more(tmp_path):
         (("x_mm", "y_mm", "force_N"), ["response", "response", "command"]),
         (("position_rad", "current_A", "voltage_raw"), ["response", "", ""]),
         (("torque_cmd", "torque_Nm", "speed"), ["command", "command", "response"]),
+        (("position_demand_mm", "position_mm", "current_A"), ["command", "response", "command"]),
         (("knob", "force_N", "a_g"), ["", "command", "response"]),
         (("knob", "dial"), ["", ""]),
     ],

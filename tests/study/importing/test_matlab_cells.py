@@ -112,3 +112,21 @@ def test_cells_and_objects_of_the_later_format_are_named(tmp_path):
     text = make_map_skeleton(read_arrays(tmp_path / "a.mat", CsvMap()))
     assert "# u holds no numbers: it is a cell, which is read where the file was saved with -v7" in text
     assert "# y holds no numbers: it is an object of the class timeseries\n# in Matlab: y = struct('time'" in text
+
+
+def test_a_proposed_map_quotes_the_labels_of_a_file(tmp_path):
+    """They say what was measured. A line of theirs never becomes a line of the map."""
+    label = "Lever angle (rad), a cell\nrole = 'command'"
+    savemat(tmp_path / "a.mat", {"y": RUNS[0], "y_label": label, "long": "m" * 200, "micro": "µm"})
+    with h5py.File(tmp_path / "b.mat", "w") as file:
+        file["y"], file["y_label"] = RUNS[0], np.frombuffer(label.encode("utf-16-le"), "u2")[:, None]
+        file["y_label"].attrs["MATLAB_class"] = np.bytes_("char")
+
+    later, earlier = (make_map_skeleton(read_arrays(tmp_path / name, CsvMap())) for name in ("b.mat", "a.mat"))
+
+    for text in (later, earlier):
+        assert "# y_label holds no numbers: it is the text 'Lever angle (rad), a cell'\n\n" in text
+        assert "\nrole = 'command'" not in text
+        assert "in Matlab" not in text
+    assert f"it is the text '{'m' * 80} ...'" in earlier
+    assert "it is the text 'µm'" in earlier
