@@ -28,47 +28,39 @@ class TestDirections:
 
     __test__ = False  # pytest collects classes whose names begin with Test
 
-    plane: Annotated[
-        Plane,
-        Field(
-            description="Plane of both directions. Default 'yz', the frontal plane, in which the picture on the "
-            "screen lies too."
-        ),
-    ] = "yz"
-    symmetry_deg: Annotated[
-        float,
-        Field(
-            ge=-180,
-            le=180,
-            description="Angle of the linkage's line of symmetry in the plane, from its first axis. Default 90: with "
-            "one leg upright the linkage is symmetric about the vertical.",
-        ),
-    ] = 90.0
+    plane: Plane = Field(
+        default="yz",
+        description="Plane of both directions. Default 'yz', the frontal plane, in which the picture on the "
+        "screen lies too.",
+    )
+    symmetry_deg: float = Field(
+        default=90.0,
+        ge=-180,
+        le=180,
+        description="Angle of the linkage's line of symmetry in the plane, from its first axis. Default 90: with "
+        "one leg upright the linkage is symmetric about the vertical.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
 class SpringSettings:
     """Weak virtual spring and damper towards the centre, which keep the handle where the linkage is symmetric."""
 
-    natural_frequency_hz: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=10,
-            description="Natural frequency with the device's own mass at the handle; 0 = no spring. Default 3.5, as "
-            "published for identification: weak, below every tested frequency, and sufficient to keep the handle "
-            "central.",
-        ),
-    ] = 3.5
-    damping_n_s_per_m: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=20,
-            description="Virtual damping in addition to the spring. Default 0, because the device's own friction "
-            "suffices and speeds differentiated from encoder readings are noisy.",
-        ),
-    ] = 0.0
+    natural_frequency_hz: float = Field(
+        default=3.5,
+        ge=0,
+        le=10,
+        description="Natural frequency with the device's own mass at the handle; 0 = no spring. Default 3.5, as "
+        "published for identification: weak, below every tested frequency, and sufficient to keep the handle "
+        "central.",
+    )
+    damping_n_s_per_m: float = Field(
+        default=0.0,
+        ge=0,
+        le=20,
+        description="Virtual damping in addition to the spring. Default 0, because the device's own friction "
+        "suffices and speeds differentiated from encoder readings are noisy.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -95,40 +87,33 @@ class SafetySettings:
             "kept.",
         ),
     ]
-    feedback_cap_n: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=6.0,
-            description="Upper limit of the norm of the spring's force, of the damper's, and of both together; a value "
-            "above total_cap_n has the effect of total_cap_n. Default 1.5, the difference between total and stimulus "
-            "cap in the shipped protocols. "
-            "Leaning on the spring then never reduces a stimulus, and the pull at a wrong position that is not "
-            "detected is limited to it. Measured: 1.35 N.",
-        ),
-    ] = 1.5
-    longest_trial_s: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=600,
-            description="A stimulus ends after this time, answered or not; such a trial is void. Default 120: even a "
-            "task without a time limit must not hold a force after the participant has left.",
-        ),
-    ] = 120.0
-    watchdog_s: Annotated[
-        float,
-        Field(
-            ge=0.3,
-            le=5,
-            description="The force fades to zero when the program sends no sign of life for this time. Default 0.5: "
-            "longer than any pause of a busy computer, and short enough not to startle.",
-        ),
-    ] = 0.5
-    release_s: Annotated[
-        float,
-        Field(gt=0, le=1, description="Duration of a safety fade. Default 0.05: short, but without a jerk."),
-    ] = 0.05
+    feedback_cap_n: float = Field(
+        default=1.5,
+        gt=0,
+        le=6.0,
+        description="Upper limit of the norm of the spring's force, of the damper's, and of both together; a value "
+        "above total_cap_n has the effect of total_cap_n. Default 1.5, the difference between total and stimulus "
+        "cap in the shipped protocols. "
+        "Leaning on the spring then never reduces a stimulus, and the pull at a wrong position that is not "
+        "detected is limited to it. Measured: 1.35 N.",
+    )
+    longest_trial_s: float = Field(
+        default=120.0,
+        gt=0,
+        le=600,
+        description="A stimulus ends after this time, answered or not; such a trial is void. Default 120: even a "
+        "task without a time limit must not hold a force after the participant has left.",
+    )
+    watchdog_s: float = Field(
+        default=0.5,
+        ge=0.3,
+        le=5,
+        description="The force fades to zero when the program sends no sign of life for this time. Default 0.5: "
+        "longer than any pause of a busy computer, and short enough not to startle.",
+    )
+    release_s: float = Field(
+        default=0.05, gt=0, le=1, description="Duration of a safety fade. Default 0.05: short, but without a jerk."
+    )
     plausibility: PlausibilitySettings = Field(default_factory=PlausibilitySettings)
 
     @model_validator(mode="after")

@@ -1,6 +1,6 @@
 """Validation of values that occur in several tables of a protocol file: names, frequencies, force amplitudes.
 
-Used by the other modules of `protocols.definition`. Where no reason is stated, a bound is chosen.
+Where no reason is stated, a bound is chosen.
 """
 
 from typing import Annotated

@@ -29,15 +29,13 @@ MAX_SCALE_STEPS = 11
 class TextSettings:
     """Texts of the participant's screens. They are part of the protocol's hash."""
 
-    language: Annotated[
-        str,
-        Field(
-            min_length=1,
-            max_length=200,
-            description="'de' (German), 'es' (Spanish), or the path of a TOML file with all texts, relative to the "
-            "folder of the protocol; `hapteq protocol texts` prints a table to translate. Default 'en', English.",
-        ),
-    ] = "en"
+    language: str = Field(
+        default="en",
+        min_length=1,
+        max_length=200,
+        description="'de' (German), 'es' (Spanish), or the path of a TOML file with all texts, relative to the "
+        "folder of the protocol; `hapteq protocol texts` prints a table to translate. Default 'en', English.",
+    )
     words: Annotated[
         dict[str, str],
         Field(
@@ -62,30 +60,24 @@ class Question:
 
     key: Annotated[Key, Field(description="Name of the answer in the log.")]
     question: Annotated[Sentence, Field(description="Text of the question.")]
-    choices: Annotated[
-        tuple[Sentence, ...],
-        Field(max_length=MAX_CHOICES, description="Answers to choose from. Default: none, see number and scale."),
-    ] = ()
-    codes: Annotated[
-        tuple[AnswerText, ...],
-        Field(
-            max_length=MAX_CHOICES,
-            description="Logged value of each choice, the same in every language. Default: the choices as written.",
-        ),
-    ] = ()
-    number: Annotated[
-        tuple[float, ...],
-        Field(max_length=2, description="Lowest and highest accepted number, such as [18, 99]. Default: none."),
-    ] = ()
+    choices: tuple[Sentence, ...] = Field(
+        default=(), max_length=MAX_CHOICES, description="Answers to choose from. Default: none, see number and scale."
+    )
+    codes: tuple[AnswerText, ...] = Field(
+        default=(),
+        max_length=MAX_CHOICES,
+        description="Logged value of each choice, the same in every language. Default: the choices as written.",
+    )
+    number: tuple[float, ...] = Field(
+        default=(), max_length=2, description="Lowest and highest accepted number, such as [18, 99]. Default: none."
+    )
     unit: Annotated[str, Field(max_length=20, description="Unit of the number, for tables. Default: none.")] = ""
-    scale: Annotated[
-        tuple[int, ...],
-        Field(max_length=2, description="First and last step of a rating scale, such as [1, 7]. Default: none."),
-    ] = ()
-    ends: Annotated[
-        tuple[AnswerText, ...],
-        Field(max_length=2, description="Meaning of the two ends of the scale. Default: not stated."),
-    ] = ()
+    scale: tuple[int, ...] = Field(
+        default=(), max_length=2, description="First and last step of a rating scale, such as [1, 7]. Default: none."
+    )
+    ends: tuple[AnswerText, ...] = Field(
+        default=(), max_length=2, description="Meaning of the two ends of the scale. Default: not stated."
+    )
 
     @property
     def steps(self) -> tuple[str, ...]:

@@ -31,33 +31,26 @@ RoveDb = Annotated[
 class ConsentSettings:
     """Consent of the participant, and exclusion criteria."""
 
-    version: Annotated[
-        str,
-        Field(
-            max_length=40,
-            description="Version of the wording; logged with the consent. Default: empty, for no wording.",
-        ),
-    ] = ""
-    ethics_id: Annotated[
-        str,
-        Field(max_length=80, description="Approval of the ethics committee; shown and logged. Default: none yet."),
-    ] = ""
-    statements: Annotated[
-        tuple[Sentence, ...],
-        Field(
-            max_length=12,
-            description="Statements, each of which the participant must agree to. Default: none, and consent is not "
-            "asked for.",
-        ),
-    ] = ()
-    exclusions: Annotated[
-        tuple[Sentence, ...],
-        Field(
-            max_length=12,
-            description="Questions; one answer 'yes' ends the sitting before any stimulus is played. Only the "
-            "outcome is stored, because the answers concern health. Default: none.",
-        ),
-    ] = ()
+    version: str = Field(
+        default="",
+        max_length=40,
+        description="Version of the wording; logged with the consent. Default: empty, for no wording.",
+    )
+    ethics_id: str = Field(
+        default="", max_length=80, description="Approval of the ethics committee; shown and logged. Default: none yet."
+    )
+    statements: tuple[Sentence, ...] = Field(
+        default=(),
+        max_length=12,
+        description="Statements, each of which the participant must agree to. Default: none, and consent is not "
+        "asked for.",
+    )
+    exclusions: tuple[Sentence, ...] = Field(
+        default=(),
+        max_length=12,
+        description="Questions; one answer 'yes' ends the sitting before any stimulus is played. Only the "
+        "outcome is stored, because the answers concern health. Default: none.",
+    )
 
     @model_validator(mode="after")
     def _require_version(self) -> Self:
@@ -73,27 +66,26 @@ class SetupSettings:
     logged at the start of every sitting."""
 
     ask: Annotated[bool, Field(description="Whether the questions on the set-up are asked. Default: no.")] = False
-    hearing_masked: Annotated[
-        bool,
-        Field(description="Ear protection or masking noise is required. Default: yes, because a device can be heard."),
-    ] = True
-    hand_hidden: Annotated[
-        bool, Field(description="The hand should be out of sight. Default: yes, because a handle can be seen moving.")
-    ] = True
-    arm_supported: Annotated[
-        bool, Field(description="The forearm should rest on something. Default: yes, because tired arms feel less.")
-    ] = True
-    grip: Annotated[
-        str,
-        Field(max_length=80, description="Grip that the participant should use. Default: as published, constant."),
-    ] = "constant and comfortable"
-    daily_check_needed: Annotated[
-        bool,
-        Field(
-            description="Whether a session on a real device begins only if that device has passed `hapteq doctor "
-            "--daily` on the same day. Default: no; if it has not passed, a warning is shown."
-        ),
-    ] = False
+    hearing_masked: bool = Field(
+        default=True,
+        description="Ear protection or masking noise is required. Default: yes, because a device can be heard.",
+    )
+    hand_hidden: bool = Field(
+        default=True, description="The hand should be out of sight. Default: yes, because a handle can be seen moving."
+    )
+    arm_supported: bool = Field(
+        default=True, description="The forearm should rest on something. Default: yes, because tired arms feel less."
+    )
+    grip: str = Field(
+        default="constant and comfortable",
+        max_length=80,
+        description="Grip that the participant should use. Default: as published, constant.",
+    )
+    daily_check_needed: bool = Field(
+        default=False,
+        description="Whether a session on a real device begins only if that device has passed `hapteq doctor "
+        "--daily` on the same day. Default: no; if it has not passed, a warning is shown.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -101,32 +93,26 @@ class MaskingSettings:
     """Pink masking noise that the program plays, so that the device is not heard; `hapteq noise` writes it to a
     file."""
 
-    play: Annotated[
-        bool,
-        Field(
-            description="Whether the program plays the noise, from before the demonstration to the end, except in "
-            "pauses. Without a working sound output no session of a person begins then. Default: no, the lab plays "
-            "the file of `hapteq noise`."
-        ),
-    ] = False
-    level_db: Annotated[
-        float,
-        Field(
-            ge=-60,
-            le=0,
-            description="Level in dB re the file of `hapteq noise`, whose highest sample lies 3 dB below full scale. "
-            "The level at the participant's ear depends on the output: measure it there. Default -20.",
-        ),
-    ] = -20.0
-    low_hz: Annotated[float, Field(ge=1, le=20_000, description="Lower corner frequency of the band. Default 40.")] = (
-        40.0
+    play: bool = Field(
+        default=False,
+        description="Whether the program plays the noise, from before the demonstration to the end, except in "
+        "pauses. Without a working sound output no session of a person begins then. Default: no, the lab plays "
+        "the file of `hapteq noise`.",
     )
-    high_hz: Annotated[
-        float, Field(ge=1, le=20_000, description="Upper corner frequency of the band. Default 8000.")
-    ] = 8000.0
-    seed: Annotated[
-        int, Field(ge=0, le=2**32 - 1, description="Seed of the noise; another seed gives other noise. Default 1.")
-    ] = 1
+    level_db: float = Field(
+        default=-20.0,
+        ge=-60,
+        le=0,
+        description="Level in dB re the file of `hapteq noise`, whose highest sample lies 3 dB below full scale. "
+        "The level at the participant's ear depends on the output: measure it there. Default -20.",
+    )
+    low_hz: float = Field(default=40.0, ge=1, le=20_000, description="Lower corner frequency of the band. Default 40.")
+    high_hz: float = Field(
+        default=8000.0, ge=1, le=20_000, description="Upper corner frequency of the band. Default 8000."
+    )
+    seed: int = Field(
+        default=1, ge=0, le=2**32 - 1, description="Seed of the noise; another seed gives other noise. Default 1."
+    )
 
     @model_validator(mode="after")
     def _require_rising_band(self) -> Self:
@@ -141,13 +127,13 @@ class MaskingSettings:
 class DemoSettings:
     """Labelled demonstration of both directions at every frequency, before the first question."""
 
-    level_n: Annotated[
-        float, Field(ge=0, le=MAX_AMPLITUDE_N, description="Amplitude, in newtons. Default 0: no demonstration.")
-    ] = 0.0
+    level_n: float = Field(
+        default=0.0, ge=0, le=MAX_AMPLITUDE_N, description="Amplitude, in newtons. Default 0: no demonstration."
+    )
     rove_db: RoveDb = 0.0
-    seconds: Annotated[
-        float, Field(ge=0.5, le=20, description="Duration of each stimulus. Default 2: ten periods at 5 Hz.")
-    ] = 2.0
+    seconds: float = Field(
+        default=2.0, ge=0.5, le=20, description="Duration of each stimulus. Default 2: ten periods at 5 Hz."
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -155,56 +141,44 @@ class PracticeSettings:
     """Practice runs, one for each frequency, at a fixed level (roved if `rove_db` is above 0), until a criterion of
     right answers is met or `trial_limit` is reached. Their trials are not part of any result."""
 
-    frequencies_hz: Annotated[
-        tuple[StimulusFrequency, ...],
-        Field(
-            max_length=20,
-            description="One practice run for each frequency, in this order, after the training. Default: none.",
-        ),
-    ] = ()
-    level_n: Annotated[
-        float,
-        Field(
-            ge=0.001,
-            le=MAX_AMPLITUDE_N,
-            description="Amplitude of the practice trials, or the middle of its range (`rove_db`). Default 2: well "
-            "above most thresholds, well below the cap.",
-        ),
-    ] = 2.0
+    frequencies_hz: tuple[StimulusFrequency, ...] = Field(
+        default=(),
+        max_length=20,
+        description="One practice run for each frequency, in this order, after the training. Default: none.",
+    )
+    level_n: float = Field(
+        default=2.0,
+        ge=0.001,
+        le=MAX_AMPLITUDE_N,
+        description="Amplitude of the practice trials, or the middle of its range (`rove_db`). Default 2: well "
+        "above most thresholds, well below the cap.",
+    )
     rove_db: RoveDb = 0.0
-    right_needed: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=50,
-            description="Number of right answers among the last `of_last` that passes the practice. Default 4.",
-        ),
-    ] = 4
-    of_last: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=50,
-            description="Number of last answers that are counted, see `right_needed`. Default 5: guessing gives 4 or "
-            "more of 5 with a probability of 19 %, and passes within the 10 trials of `trial_limit` with 45 %.",
-        ),
-    ] = 5
-    trial_limit: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=200,
-            description="Number of trials after which a practice run ends, passed or not. Default 10. A participant "
-            "who does not pass is not excluded: at high frequencies this is a result.",
-        ),
-    ] = 10
-    feedback: Annotated[
-        Literal["none", "after_answer"],
-        Field(
-            description="Like trial.feedback, for the practice alone. Default: after each answer, so that the task "
-            "can be learnt."
-        ),
-    ] = "after_answer"
+    right_needed: int = Field(
+        default=4,
+        ge=1,
+        le=50,
+        description="Number of right answers among the last `of_last` that passes the practice. Default 4.",
+    )
+    of_last: int = Field(
+        default=5,
+        ge=1,
+        le=50,
+        description="Number of last answers that are counted, see `right_needed`. Default 5: guessing gives 4 or "
+        "more of 5 with a probability of 19 %, and passes within the 10 trials of `trial_limit` with 45 %.",
+    )
+    trial_limit: int = Field(
+        default=10,
+        ge=1,
+        le=200,
+        description="Number of trials after which a practice run ends, passed or not. Default 10. A participant "
+        "who does not pass is not excluded: at high frequencies this is a result.",
+    )
+    feedback: Literal["none", "after_answer"] = Field(
+        default="after_answer",
+        description="Like trial.feedback, for the practice alone. Default: after each answer, so that the task "
+        "can be learnt.",
+    )
 
     @model_validator(mode="after")
     def _require_reachable_criterion(self) -> Self:

@@ -45,51 +45,44 @@ class ProbeSettings:
     """Settings of probes and references: odd multisines on all three axes at once, which the participant is not asked
     about."""
 
-    levels_n: Annotated[
-        tuple[LevelN, ...],
-        Field(
-            max_length=6,
-            description="Peak forces of the probes with a hand on the handle, in newtons, played in turn. Three "
-            "levels, such as [0.2, 0.4, 0.8], distinguish friction from damping by the level dependence of the "
-            "response. Default: none, and no probe is played between trials.",
-        ),
-    ] = ()
-    probe_cap_n: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=1.5,
-            description="Upper limit of the probes with a hand on the handle; below staircase.cap_n. Default 1.",
-        ),
-    ] = 1.0
-    interval_s: Annotated[
-        float,
-        Field(ge=15, le=3600, description="Shortest time from one probe to the next. Default 60: once a minute."),
-    ] = 60.0
-    to_hz: Annotated[
-        float,
-        Field(
-            ge=20,
-            le=150,
-            description="Upper limit of the frequencies of the lines; at least 45 with a reference. Default 60.",
-        ),
-    ] = 60.0
-    reference_s: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=120,
-            description="Length of the reference, a probe without a hand on the handle. It is played at the start of "
-            "a sitting and after long pauses. 20 suffices. Default 0: no reference.",
-        ),
-    ] = 0.0
-    reference_n: Annotated[
-        float, Field(gt=0, le=1.5, description="Peak force of the reference; not above staircase.cap_n. Default 1.")
-    ] = 1.0
-    reference_after_pause_s: Annotated[
-        float,
-        Field(ge=0, le=36000, description="Length of a pause from which on another reference follows. Default 120."),
-    ] = 120.0
+    levels_n: tuple[LevelN, ...] = Field(
+        default=(),
+        max_length=6,
+        description="Peak forces of the probes with a hand on the handle, in newtons, played in turn. Three "
+        "levels, such as [0.2, 0.4, 0.8], distinguish friction from damping by the level dependence of the "
+        "response. Default: none, and no probe is played between trials.",
+    )
+    probe_cap_n: float = Field(
+        default=1.0,
+        gt=0,
+        le=1.5,
+        description="Upper limit of the probes with a hand on the handle; below staircase.cap_n. Default 1.",
+    )
+    interval_s: float = Field(
+        default=60.0, ge=15, le=3600, description="Shortest time from one probe to the next. Default 60: once a minute."
+    )
+    to_hz: float = Field(
+        default=60.0,
+        ge=20,
+        le=150,
+        description="Upper limit of the frequencies of the lines; at least 45 with a reference. Default 60.",
+    )
+    reference_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=120,
+        description="Length of the reference, a probe without a hand on the handle. It is played at the start of "
+        "a sitting and after long pauses. 20 suffices. Default 0: no reference.",
+    )
+    reference_n: float = Field(
+        default=1.0, gt=0, le=1.5, description="Peak force of the reference; not above staircase.cap_n. Default 1."
+    )
+    reference_after_pause_s: float = Field(
+        default=120.0,
+        ge=0,
+        le=36000,
+        description="Length of a pause from which on another reference follows. Default 120.",
+    )
 
     @model_validator(mode="after")
     def _check_limits(self) -> Self:

@@ -33,52 +33,41 @@ class RecordingProtocol:
     source: Source = ""
     directions: TestDirections = Field(default_factory=TestDirections)
     spring: SpringSettings = Field(default_factory=SpringSettings)
-    hand: Annotated[
-        Literal["none", "held"],
-        Field(
-            description="Whether a person holds the handle. Default 'none', because a spring is reproducible and a "
-            "grip is not. Only a protocol with 'held' is played into a hand."
-        ),
-    ] = "none"
-    rest_s: Annotated[
-        float,
-        Field(
-            ge=0.1,
-            le=60,
-            description="Rest before, between and after the excitations. Default 1: vibrations have decayed by then. "
-            "The rest also records the sensor's noise.",
-        ),
-    ] = 1.0
-    repeats: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=100,
-            description="Number of times that the whole list is played. Default 1; with more, noise can be "
-            "distinguished from the device's response.",
-        ),
-    ] = 1
-    fade_s: Annotated[
-        float,
-        Field(gt=0, le=5, description="Time over which every excitation rises and falls. Default 0.1: no click."),
-    ] = 0.1
-    lower_on_clip: Annotated[
-        bool,
-        Field(
-            description="Whether an excitation at which the accelerometer or the total force reaches its limit is "
-            "played again with a lower amplitude. Default true: clipped samples contain no information about the "
-            "device."
-        ),
-    ] = True
-    least_amplitude_n: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=MAX_AMPLITUDE_N,
-            description="Lowest amplitude to which an excitation is reduced. Default 0.2: about the friction of such "
-            "a device, below which it hardly moves.",
-        ),
-    ] = 0.2
+    hand: Literal["none", "held"] = Field(
+        default="none",
+        description="Whether a person holds the handle. Default 'none', because a spring is reproducible and a "
+        "grip is not. Only a protocol with 'held' is played into a hand.",
+    )
+    rest_s: float = Field(
+        default=1.0,
+        ge=0.1,
+        le=60,
+        description="Rest before, between and after the excitations. Default 1: vibrations have decayed by then. "
+        "The rest also records the sensor's noise.",
+    )
+    repeats: int = Field(
+        default=1,
+        ge=1,
+        le=100,
+        description="Number of times that the whole list is played. Default 1; with more, noise can be "
+        "distinguished from the device's response.",
+    )
+    fade_s: float = Field(
+        default=0.1, gt=0, le=5, description="Time over which every excitation rises and falls. Default 0.1: no click."
+    )
+    lower_on_clip: bool = Field(
+        default=True,
+        description="Whether an excitation at which the accelerometer or the total force reaches its limit is "
+        "played again with a lower amplitude. Default true: clipped samples contain no information about the "
+        "device.",
+    )
+    least_amplitude_n: float = Field(
+        default=0.2,
+        gt=0,
+        le=MAX_AMPLITUDE_N,
+        description="Lowest amplitude to which an excitation is reduced. Default 0.2: about the friction of such "
+        "a device, below which it hardly moves.",
+    )
 
     @model_validator(mode="after")
     def _require_amplitudes_within_cap(self) -> Self:

@@ -52,15 +52,13 @@ class SineSegment:
     amplitude_n: Amplitude
     along: AxisName
     duration_s: Annotated[float, Field(gt=0, le=600, description="Evaluated part of every sinusoid; whole periods.")]
-    settle_s: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=60,
-            description="Time that each sinusoid is played before the evaluated part. Default 1: resonances have "
-            "decayed by then.",
-        ),
-    ] = 1.0
+    settle_s: float = Field(
+        default=1.0,
+        ge=0,
+        le=60,
+        description="Time that each sinusoid is played before the evaluated part. Default 1: resonances have "
+        "decayed by then.",
+    )
     role: Role = ""
 
 
@@ -117,30 +115,21 @@ class MultisineSegment:
     ]
     duration_s: Annotated[float, Field(gt=0, le=600, description="One period: lines lie 1 / duration_s apart.")]
     periods: Periods = 2
-    odd_only: Annotated[
-        bool,
-        Field(
-            description="Whether only odd multiples of 1 / duration_s are excited. Default true: even distortion "
-            "then falls between the lines."
-        ),
-    ] = True
-    seed: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=2**53,
-            description="Seed of the phases; the same seed gives the same excitation. Default 1.",
-        ),
-    ] = 1
-    realisations: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=50,
-            description="Number of excitations with different phases. Default 1; with more, distortion can be "
-            "distinguished from the linear response.",
-        ),
-    ] = 1
+    odd_only: bool = Field(
+        default=True,
+        description="Whether only odd multiples of 1 / duration_s are excited. Default true: even distortion "
+        "then falls between the lines.",
+    )
+    seed: int = Field(
+        default=1, ge=0, le=2**53, description="Seed of the phases; the same seed gives the same excitation. Default 1."
+    )
+    realisations: int = Field(
+        default=1,
+        ge=1,
+        le=50,
+        description="Number of excitations with different phases. Default 1; with more, distortion can be "
+        "distinguished from the linear response.",
+    )
     role: Role = ""
 
     @model_validator(mode="after")

@@ -49,24 +49,20 @@ class BayesianPlacement:
     """Levels by the Psi method (Kontsevich and Tyler, Vision Research 39 (1999), 2729) in place of the up-down rule;
     the method is in `protocols.procedure.psi`."""
 
-    trials: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=500,
-            description="Number of trials of a run at levels chosen by Psi, from the cap downwards in steps of 1 dB; "
-            "0: the up-down rule. The first trial is at start_n in either case. Default: 0, as published.",
-        ),
-    ] = 0
-    spread_db: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=20,
-            description="Standard deviation of the threshold's posterior, in dB, at which a run ends earlier. "
-            "Default: 0, never.",
-        ),
-    ] = 0.0
+    trials: int = Field(
+        default=0,
+        ge=0,
+        le=500,
+        description="Number of trials of a run at levels chosen by Psi, from the cap downwards in steps of 1 dB; "
+        "0: the up-down rule. The first trial is at start_n in either case. Default: 0, as published.",
+    )
+    spread_db: float = Field(
+        default=0.0,
+        ge=0,
+        le=20,
+        description="Standard deviation of the threshold's posterior, in dB, at which a run ends earlier. "
+        "Default: 0, never.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -94,62 +90,48 @@ class StaircaseRule:
     averaged_reversals: Annotated[
         int, Field(ge=1, le=100, description="Number of last peaks and valleys whose mean is the threshold.")
     ]
-    step_change: Annotated[
-        StepChange,
-        Field(
-            description="Step size at the reversal that completes a phase. Default: the old one, because a phase of "
-            "three reversals 'at 4 dB' means that the movement at its third reversal is 4 dB too."
-        ),
-    ] = StepChange.AFTER_REVERSAL
-    initial_one_up_one_down: Annotated[
-        bool,
-        Field(
-            description="Whether the level moves after every answer until the first reversal. Default: no, because "
-            "the rule is stated for the whole run, and this shortcut raises the spread of the threshold by 30 to 55 "
-            "%."
-        ),
-    ] = False
-    reversal: Annotated[
-        Literal["level_direction"],
-        Field(
-            description="Definition of a reversal. Default, and the only value: a change of the level's direction. "
-            "The first movement is not a reversal, because answers that merely alternate produce no peaks and "
-            "valleys to average."
-        ),
-    ] = "level_direction"
-    at_cap: Annotated[
-        Literal["clamp"],
-        Field(
-            description="Behaviour at the cap. Default, and the only value: a movement beyond the cap ends at the "
-            "cap, and the next one starts there. An upward movement at the cap changes nothing and is not a "
-            "reversal, because the level does not change its direction. Both are counted."
-        ),
-    ] = "clamp"
-    mean: Annotated[
-        Literal["newton"],
-        Field(
-            description="Mean of the peaks and valleys. Default, and the only value: arithmetic mean in newtons, the "
-            "unit of the published figure. The mean in dB is written in addition."
-        ),
-    ] = "newton"
-    trial_limit: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=10_000,
-            description="Number of trials after which a run ends even without its reversals; 0 = never. Default: "
-            "never, as published. A participant who only guesses needs about 110 trials.",
-        ),
-    ] = 0
+    step_change: StepChange = Field(
+        default=StepChange.AFTER_REVERSAL,
+        description="Step size at the reversal that completes a phase. Default: the old one, because a phase of "
+        "three reversals 'at 4 dB' means that the movement at its third reversal is 4 dB too.",
+    )
+    initial_one_up_one_down: bool = Field(
+        default=False,
+        description="Whether the level moves after every answer until the first reversal. Default: no, because "
+        "the rule is stated for the whole run, and this shortcut raises the spread of the threshold by 30 to 55 "
+        "%.",
+    )
+    reversal: Literal["level_direction"] = Field(
+        default="level_direction",
+        description="Definition of a reversal. Default, and the only value: a change of the level's direction. "
+        "The first movement is not a reversal, because answers that merely alternate produce no peaks and "
+        "valleys to average.",
+    )
+    at_cap: Literal["clamp"] = Field(
+        default="clamp",
+        description="Behaviour at the cap. Default, and the only value: a movement beyond the cap ends at the "
+        "cap, and the next one starts there. An upward movement at the cap changes nothing and is not a "
+        "reversal, because the level does not change its direction. Both are counted.",
+    )
+    mean: Literal["newton"] = Field(
+        default="newton",
+        description="Mean of the peaks and valleys. Default, and the only value: arithmetic mean in newtons, the "
+        "unit of the published figure. The mean in dB is written in addition.",
+    )
+    trial_limit: int = Field(
+        default=0,
+        ge=0,
+        le=10_000,
+        description="Number of trials after which a run ends even without its reversals; 0 = never. Default: "
+        "never, as published. A participant who only guesses needs about 110 trials.",
+    )
 
-    bayesian: Annotated[
-        BayesianPlacement,
-        Field(
-            description="Psi method (Kontsevich and Tyler 1999) in place of the up-down rule: each level is the one "
-            "whose answer is expected to leave the lowest entropy of threshold and slope. Steps and reversals above "
-            "are then not used, and the threshold is the posterior mean. Default: off, as published."
-        ),
-    ] = BayesianPlacement()
+    bayesian: BayesianPlacement = Field(
+        default=BayesianPlacement(),
+        description="Psi method (Kontsevich and Tyler 1999) in place of the up-down rule: each level is the one "
+        "whose answer is expected to leave the lowest entropy of threshold and slope. Steps and reversals above "
+        "are then not used, and the threshold is the posterior mean. Default: off, as published.",
+    )
 
     @property
     def is_bayesian(self) -> bool:

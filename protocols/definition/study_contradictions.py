@@ -1,8 +1,7 @@
 """Consistency checks of a study protocol across its tables: finds values that contradict each other.
 
-Called by `study_protocol` when a protocol is validated. Most contradictions within a table are found by the table's
-class. Each function that finds problems names their keys by dotted paths from the top of the protocol; an empty list
-means that there is none.
+Most contradictions within a table are found by the table's class. Each function that finds problems names their keys by
+dotted paths from the top of the protocol; an empty list means that there is none.
 """
 
 from __future__ import annotations

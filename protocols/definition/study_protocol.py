@@ -40,57 +40,45 @@ class StimulusSettings:
             description="Frequencies in hertz, one staircase each. Empty for a session that consists of training only.",
         ),
     ]
-    quantity: Annotated[
-        Literal["commanded_force", "delivered_acceleration"],
-        Field(
-            description="Quantity that the staircase changes. Default: the commanded force, as published. "
-            "'delivered_acceleration' needs an equalizer model and is refused without one."
-        ),
-    ] = "commanded_force"
-    fade_in_s: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=5,
-            description="Time over which the amplitude rises. Default 0.5: two and a half periods at 5 Hz, so that "
-            "no onset reveals the direction.",
-        ),
-    ] = 0.5
-    fade_out_s: Annotated[
-        float,
-        Field(
-            gt=0,
-            le=5,
-            description="Time over which the amplitude falls after the answer. Default 0.25: no jerk, no waiting.",
-        ),
-    ] = 0.25
-    fade_shape: Annotated[
-        Literal["raised_cosine", "linear"],
-        Field(
-            description="Shape of the fades. Default: raised cosine. It has no corner at either end, and therefore "
-            "no click."
-        ),
-    ] = "raised_cosine"
-    onset_polarity: Annotated[
-        Literal["random", "positive"],
-        Field(
-            description="Sign of the first half-wave. Default: random, so that the first push does not reveal the "
-            "direction."
-        ),
-    ] = "random"
-    rove_db: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=20,
-            description="Width of the range from which the amplitude of each trial is drawn, uniformly in dB and for "
-            "both directions alike; the staircase's level is its middle. Applies to staircases on directions, as a "
-            "control that directions are not distinguished by strength. With a range of r dB, a difference of d dB "
-            "between the directions allows at most 50 + 50 d / r % right answers by strength alone. Half of the "
-            "range lies above the level, so that staircase.cap_n must leave room below safety.stimulus_cap_n. "
-            "Default 0: each trial at the staircase's level, as published.",
-        ),
-    ] = 0.0
+    quantity: Literal["commanded_force", "delivered_acceleration"] = Field(
+        default="commanded_force",
+        description="Quantity that the staircase changes. Default: the commanded force, as published. "
+        "'delivered_acceleration' needs an equalizer model and is refused without one.",
+    )
+    fade_in_s: float = Field(
+        default=0.5,
+        gt=0,
+        le=5,
+        description="Time over which the amplitude rises. Default 0.5: two and a half periods at 5 Hz, so that "
+        "no onset reveals the direction.",
+    )
+    fade_out_s: float = Field(
+        default=0.25,
+        gt=0,
+        le=5,
+        description="Time over which the amplitude falls after the answer. Default 0.25: no jerk, no waiting.",
+    )
+    fade_shape: Literal["raised_cosine", "linear"] = Field(
+        default="raised_cosine",
+        description="Shape of the fades. Default: raised cosine. It has no corner at either end, and therefore "
+        "no click.",
+    )
+    onset_polarity: Literal["random", "positive"] = Field(
+        default="random",
+        description="Sign of the first half-wave. Default: random, so that the first push does not reveal the "
+        "direction.",
+    )
+    rove_db: float = Field(
+        default=0.0,
+        ge=0,
+        le=20,
+        description="Width of the range from which the amplitude of each trial is drawn, uniformly in dB and for "
+        "both directions alike; the staircase's level is its middle. Applies to staircases on directions, as a "
+        "control that directions are not distinguished by strength. With a range of r dB, a difference of d dB "
+        "between the directions allows at most 50 + 50 d / r % right answers by strength alone. Half of the "
+        "range lies above the level, so that staircase.cap_n must leave room below safety.stimulus_cap_n. "
+        "Default 0: each trial at the staircase's level, as published.",
+    )
 
     @model_validator(mode="after")
     def _check_distinct(self) -> Self:
@@ -104,118 +92,102 @@ class StimulusSettings:
 class ScheduleSettings:
     """Order of the frequencies, and randomisation of directions and labels."""
 
-    order: Annotated[
-        Literal["random", "williams", "as_listed"],
-        Field(
-            description="Order of the frequencies. Default: random, as published; 'williams' balances "
-            "position and first-order carry-over over participants."
-        ),
-    ] = "random"
-    directions: Annotated[
-        Literal["independent", "balanced"],
-        Field(
-            description="Randomisation of the directions. Default: independent, so that a run of equal directions "
-            "does not predict the next one. 'balanced' shows both equally often within every eight trials."
-        ),
-    ] = "independent"
-    labels: Annotated[
-        Literal["fixed", "swapped_for_half"],
-        Field(
-            description="Whether the numbers 1 and 2 are exchanged for every second participant. Default: fixed, as "
-            "published. Exchanged numbers separate a bias towards a key from a bias towards a direction."
-        ),
-    ] = "fixed"
+    order: Literal["random", "williams", "as_listed"] = Field(
+        default="random",
+        description="Order of the frequencies. Default: random, as published; 'williams' balances "
+        "position and first-order carry-over over participants.",
+    )
+    directions: Literal["independent", "balanced"] = Field(
+        default="independent",
+        description="Randomisation of the directions. Default: independent, so that a run of equal directions "
+        "does not predict the next one. 'balanced' shows both equally often within every eight trials.",
+    )
+    labels: Literal["fixed", "swapped_for_half"] = Field(
+        default="fixed",
+        description="Whether the numbers 1 and 2 are exchanged for every second participant. Default: fixed, as "
+        "published. Exchanged numbers separate a bias towards a key from a bias towards a direction.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
 class TrialSettings:
     """Answer of a trial: buttons, feedback, repeats and time limit; and the pause after it."""
 
-    device_buttons: Annotated[
-        tuple[int, ...],
-        Field(
-            max_length=2,
-            description="Numbers of the device's buttons that answer 1 and 2, in addition to the keys. Default: none.",
-        ),
-    ] = ()
+    device_buttons: tuple[int, ...] = Field(
+        default=(),
+        max_length=2,
+        description="Numbers of the device's buttons that answer 1 and 2, in addition to the keys. Default: none.",
+    )
 
-    feedback: Annotated[
-        Literal["none", "after_answer"],
-        Field(
-            description="Whether the participant is told if the answer was right. Default: none, because none is "
-            "published, and because feedback would teach cues other than direction."
-        ),
-    ] = "none"
-    repeats_per_run: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=100,
-            description="Number of times in a run that the participant may ask for the same stimulus again; 0: "
-            "never. Default 3: for a cough or a noise in some 60 trials.",
-        ),
-    ] = 3
-    time_limit_s: Annotated[
-        float,
-        Field(ge=0, le=600, description="Longest time to answer. Default 0: no limit, as published."),
-    ] = 0.0
-    pause_between_s: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=60,
-            description="Time without a stimulus between an answer and the next stimulus. Default 0.5: the next "
-            "onset is felt as new.",
-        ),
-    ] = 0.5
+    feedback: Literal["none", "after_answer"] = Field(
+        default="none",
+        description="Whether the participant is told if the answer was right. Default: none, because none is "
+        "published, and because feedback would teach cues other than direction.",
+    )
+    repeats_per_run: int = Field(
+        default=3,
+        ge=0,
+        le=100,
+        description="Number of times in a run that the participant may ask for the same stimulus again; 0: "
+        "never. Default 3: for a cough or a noise in some 60 trials.",
+    )
+    time_limit_s: float = Field(
+        default=0.0, ge=0, le=600, description="Longest time to answer. Default 0: no limit, as published."
+    )
+    pause_between_s: float = Field(
+        default=0.5,
+        ge=0,
+        le=60,
+        description="Time without a stimulus between an answer and the next stimulus. Default 0.5: the next "
+        "onset is felt as new.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
 class TrainingSettings:
     """Training runs before the test runs. They follow the same rule, and their trials are not part of any result."""
 
-    frequencies_hz: Annotated[
-        tuple[StimulusFrequency, ...],
-        Field(max_length=20, description="One training run for each frequency, in this order. Default: no training."),
-    ] = ()
-    trial_limit: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=1000,
-            description="Number of trials after which a training run ends at the latest. Default 0: a whole "
-            "staircase, so that no participant starts untrained.",
-        ),
-    ] = 0
-    feedback: Annotated[
-        Literal["none", "after_answer"],
-        Field(
-            description="Like trial.feedback, for the training alone. Default: none, like the trials that it prepares."
-        ),
-    ] = "none"
+    frequencies_hz: tuple[StimulusFrequency, ...] = Field(
+        default=(),
+        max_length=20,
+        description="One training run for each frequency, in this order. Default: no training.",
+    )
+    trial_limit: int = Field(
+        default=0,
+        ge=0,
+        le=1000,
+        description="Number of trials after which a training run ends at the latest. Default 0: a whole "
+        "staircase, so that no participant starts untrained.",
+    )
+    feedback: Literal["none", "after_answer"] = Field(
+        default="none",
+        description="Like trial.feedback, for the training alone. Default: none, like the trials that it prepares.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
 class RestSettings:
     """Enforced pauses, because vibration numbs the hand."""
 
-    after_run_s: Annotated[
-        float,
-        Field(ge=0, le=3600, description="Shortest rest between two runs. Default 60: numbness fades in a minute."),
-    ] = 60.0
-    after_trials: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=1000,
-            description="Number of trials after which a rest within a run follows. Default 0: no rest, because a run "
-            "takes minutes.",
-        ),
-    ] = 0
-    within_run_s: Annotated[
-        float,
-        Field(ge=0, le=3600, description="Shortest rest within a run. Default 30; not used while after_trials is 0."),
-    ] = 30.0
+    after_run_s: float = Field(
+        default=60.0,
+        ge=0,
+        le=3600,
+        description="Shortest rest between two runs. Default 60: numbness fades in a minute.",
+    )
+    after_trials: int = Field(
+        default=0,
+        ge=0,
+        le=1000,
+        description="Number of trials after which a rest within a run follows. Default 0: no rest, because a run "
+        "takes minutes.",
+    )
+    within_run_s: float = Field(
+        default=30.0,
+        ge=0,
+        le=3600,
+        description="Shortest rest within a run. Default 30; not used while after_trials is 0.",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -248,13 +220,12 @@ class StudyProtocol:
     probes: ProbeSettings = Field(default_factory=ProbeSettings)
     analysis: AnalysisSettings = Field(default_factory=AnalysisSettings)
     text: TextSettings = Field(default_factory=TextSettings)
-    before: Annotated[
-        tuple[Question, ...],
-        Field(max_length=20, description="Questions before the first trial, such as age. Default: none."),
-    ] = ()
-    debrief: Annotated[
-        tuple[Question, ...], Field(max_length=20, description="Questions after the last run. Default: none.")
-    ] = ()
+    before: tuple[Question, ...] = Field(
+        default=(), max_length=20, description="Questions before the first trial, such as age. Default: none."
+    )
+    debrief: tuple[Question, ...] = Field(
+        default=(), max_length=20, description="Questions after the last run. Default: none."
+    )
 
     @property
     def all_frequencies_hz(self) -> tuple[float, ...]:

@@ -1,7 +1,6 @@
 """Serialisation of a protocol to plain values and to TOML text; the inverse is `loading`.
 
-Every default is written out, so that the text states all settings. Called by `hashing` and `explain` (values) and by
-`study` (text).
+Every default is written out, so that the text states all settings.
 """
 
 import json

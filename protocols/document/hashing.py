@@ -48,51 +48,30 @@ TABLE_ADDITIONS = {
 left out of the hash."""
 
 SAFETY_ADDITIONS: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": PLAUSIBILITY_DEFAULTS}
-"""Safety settings added later, in study and recording protocols, by dotted path, with their defaults; forces in N."""
-
-ROVE_ADDITIONS: dict[str, DefaultValue] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
-"""Roving (random variation, dB) of the level in demonstration, practice and test, added later; 0 = none."""
-
-TIMING_ADDITIONS: dict[str, DefaultValue] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
-"""Limits on late ticks of the control loop added later."""
-
-SENSOR_ADDITIONS: dict[str, DefaultValue] = {
-    "measurement.lost_packets_limit": 0.05,
-    "measurement.accelerometer_needed": False,
-}
-"""Requirements on the accelerometer added later."""
-
-SETUP_ADDITIONS: dict[str, DefaultValue] = {"setup.daily_check_needed": False}
-"""Requirement of a daily device check, added later."""
-
-QUESTION_ADDITIONS: dict[str, DefaultValue] = {
-    "debrief.codes": [],
-    "debrief.number": [],
-    "debrief.unit": "",
-    "debrief.scale": [],
-    "debrief.ends": [],
-}
-"""Kinds of answers to the questions of the debriefing added later; each path stands for all questions."""
-ANALYSIS_ADDITIONS: dict[str, DefaultValue] = {"analysis.interval": "undeclared"}
-"""Declaration of the confidence interval, added later."""
-
-STAIRCASE_ADDITIONS: dict[str, DefaultValue] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
-"""Bayesian placement of levels, added later; off by default."""
+"""Safety settings added later to both kinds of protocol, with their defaults; forces in N."""
 
 FIELD_ADDITIONS: dict[str, dict[str, DefaultValue]] = {
     "study": {
+        **SAFETY_ADDITIONS,
         "trial.device_buttons": [],
         "trial.repeats_per_run": 3,
-        **ROVE_ADDITIONS,
-        **SAFETY_ADDITIONS,
-        **TIMING_ADDITIONS,
-        **SENSOR_ADDITIONS,
-        **SETUP_ADDITIONS,
-        **QUESTION_ADDITIONS,
-        **STAIRCASE_ADDITIONS,
-        **ANALYSIS_ADDITIONS,
+        "demo.rove_db": 0.0,
+        "practice.rove_db": 0.0,
+        "stimulus.rove_db": 0.0,
+        "measurement.late_ticks_limit": 1.0,
+        "measurement.longest_late_ms": 1000.0,
+        "measurement.lost_packets_limit": 0.05,
+        "measurement.accelerometer_needed": False,
+        "setup.daily_check_needed": False,
+        "debrief.codes": [],
+        "debrief.number": [],
+        "debrief.unit": "",
+        "debrief.scale": [],
+        "debrief.ends": [],
+        "staircase.bayesian": {"trials": 0, "spread_db": 0.0},
+        "analysis.interval": "undeclared",
     },
-    "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_ADDITIONS},
+    "recording": {**SAFETY_ADDITIONS, "lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": ""},
 }
 """Fields added after the first locks and sessions, with their default values, by kind of protocol and dotted path. A
 path through a list, such as `segments.role`, applies to every entry."""

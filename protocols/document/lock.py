@@ -1,8 +1,6 @@
 """Lock of a protocol: its hash, stored before data are collected, and the check that the protocol is unchanged.
 
-With a lock, a change of the settings after the start of data collection is detected. A lock is a JSON document. Called
-by `study.store.formats.protocol_files`, which reads and writes the file, and by
-`study.workflows.files.session_recognisers`.
+With a lock, a change of the settings after the start of data collection is detected. A lock is a JSON document.
 """
 
 import json

@@ -1,8 +1,7 @@
 """JSON Schema of protocol files, and the values that it allows at each place of a file, in words.
 
 The schema is generated from the dataclasses of `protocols.definition`, which state key names, bounds, defaults and
-reasons. Called by the other modules of this package, by `study.importing.map_format.map_toml` and by
-`study.workflows.files` (recognition of files, documentation of formats).
+reasons.
 """
 
 from functools import cache

@@ -1,7 +1,7 @@
 """Translate pydantic's validation errors into messages for the author of a protocol file: key, problem, allowed values.
 
 Keys are written as in the file, with list entries counted from 1. A misspelt key is reported once, with the known key
-that was probably meant. Called by `loading`.
+that was probably meant.
 """
 
 from collections.abc import Sequence

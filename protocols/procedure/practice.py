@@ -1,8 +1,7 @@
 """Criterion of a practice run (short, around a fixed level, before the test): when it ends, and whether it is passed.
 
 Passed with `right_needed` correct answers among the last `of_last`, within `trial_limit` trials (`PracticeSettings`).
-The state is immutable: `add_answer` returns the next one. Called by `study.session` (state, progress of a followed
-session), `study.workflows.session.run_session` and `analysis.psychophysics.study_analysis`.
+The state is immutable: `add_answer` returns the next one.
 """
 
 from dataclasses import dataclass

@@ -9,8 +9,7 @@ answer is expected to be
 
 The next level is a fixed function of the answers before it, so that replaying a log gives the same levels, and the
 likelihood of the answers needs no correction. Levels end at the force cap; thresholds of the grid go beyond it, so that
-the posterior can say that the threshold lies above the cap. Called by `protocols.procedure.staircase`,
-`analysis.psychophysics.thresholds` (threshold of a run) and `analysis.psychophysics.power` (simulated runs).
+the posterior can say that the threshold lies above the cap.
 
 Source: L. L. Kontsevich, C. W. Tyler, Vision Res. 39 (1999), 2729-2737.
 """

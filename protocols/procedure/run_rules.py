@@ -1,7 +1,5 @@
 """Staircase rule of a run by its phase: training has another trial limit than the test, detection another start level
 and trial limit.
-
-Called by `study.session.state.state` when a run begins, and by `analysis.psychophysics.detection`.
 """
 
 from dataclasses import replace

@@ -2,8 +2,7 @@
 
 A draw depends only on the seed and its key (such as run, trial, attempt), not on earlier draws: a repeated trial, a
 resumed session or a replay changes no later draw. The random 64-bit words come directly from numpy's SeedSequence,
-whose output is guaranteed never to change, so that a session can be checked years later. Called by
-`study.session.state`, among others.
+whose output is guaranteed never to change, so that a session can be checked years later.
 """
 
 from dataclasses import dataclass

@@ -79,7 +79,7 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     counted_state = _count_answer(rule, state, correct)
     if rule.is_bayesian:
         return _apply_psi(rule, counted_state, correct)
-    is_initial = _is_in_initial_phase(rule, state)
+    is_initial = rule.initial_one_up_one_down and state.reversals == 0
     if counted_state.wrong_in_a_row >= (1 if is_initial else rule.up_after_wrong):
         return _move_level(rule, counted_state, Heading.UP)
     if counted_state.right_in_a_row >= (1 if is_initial else rule.down_after_right):
@@ -180,11 +180,6 @@ def _find_step_db(rule: StaircaseRule, reversals_before: int, is_reversal: bool)
             return phase.step_db
         reversal_count -= phase.reversals
     return rule.steps[-1].step_db
-
-
-def _is_in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
-    """Whether the 1 up, 1 down rule applies: until the first reversal, if the rule has `initial_one_up_one_down`."""
-    return rule.initial_one_up_one_down and state.reversals == 0
 
 
 _LEVEL_TOLERANCE_DB = 1e-9

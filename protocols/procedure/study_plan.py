@@ -3,8 +3,7 @@
 The order of the frequencies is counterbalanced by a Williams design (`schedule.make_williams_rows`). A participant's
 number determines the row of the design and whether the labels 1 and 2 of the directions are swapped. Both repeat after
 a cycle of participants; each position in the cycle is a cell of the design. A sample of n participants fills the cells
-in turn. A cell whose participant is left out lacks a participant, because a number is never assigned again. Called by
-`study.workflows.views.plan_study`.
+in turn. A cell whose participant is left out lacks a participant, because a number is never assigned again.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,6 @@
 """All English texts for participants by key, and the placeholders that a translation of each must contain.
 
-Merges the tables of the modules `english_*`. Called by `words` (texts to show), `translation` (checks of a table) and
-`study.store.formats.participant_texts` (reading a table).
+Merges the tables of the modules `english_*`.
 """
 
 from string import Formatter

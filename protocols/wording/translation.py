@@ -1,7 +1,7 @@
 """Insertion of a language's texts into the values of a protocol, and validation of a table of such texts.
 
 The texts become part of the protocol, and thereby of its hash and of every session log: what a participant read is
-recorded. Called by `study.store.formats.participant_texts` when a protocol is read.
+recorded.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,6 +38,9 @@ def find_table_problems(table: Mapping[str, Any], require_all: bool) -> tuple[Pr
     if require_all:
         problems += [Problem(key, "is missing", f'its translation of "{_shorten(ENGLISH[key])}"') for key in ENGLISH
                      if key not in table]  # fmt: skip
+    yes, no = (str({**ENGLISH, **table}[key]).strip().casefold() for key in ("yes", "no"))
+    if yes == no:  # a refusal would be logged as a consent
+        problems.append(Problem("no", "is the text of yes", "two different texts"))
     return tuple(problems)
 
 

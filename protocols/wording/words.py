@@ -6,6 +6,7 @@ pattern and translates them.
 """
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -53,6 +54,12 @@ class Words:
     def fill_count(self, key: str, count: int) -> str:
         """Fill a count into a text: `<key>_1`, the singular, for a count of 1, else `<key>_n`."""
         return self[f"{key}_1"] if count == 1 else self.fill(f"{key}_n", {"count": count})
+
+    def is_typed(self, key: str, typed: str) -> bool:
+        """Whether the typed text is the text with this key, regardless of case, blanks around it, and whether accents
+        are encoded as separate characters."""
+        typed_word, word = (unicodedata.normalize("NFC", text.strip()).casefold() for text in (typed, self[key]))
+        return typed_word == word
 
     def translate_key(self, english_label: str) -> str:
         """Translate the footer's label of a keyboard key; unchanged where it is not in `FOOTER_KEYS`, as on the

@@ -166,3 +166,16 @@ def test_a_question_of_two_kinds_or_none_is_refused(question, key):
     with pytest.raises(ProtocolError) as refused:
         load_protocol(text, "mine")
     assert refused.value.key == f"before[1].{key}"
+
+
+@pytest.mark.parametrize("word", ["Rückzug ", "Ru\u0308ckzug", "\tRÜCKZUG"])
+def test_a_word_is_typed_in_any_case_with_blanks_and_either_encoding_of_its_accents(word):
+    """A participant could not withdraw where the table had a blank after the word."""
+    words = Words({"withdraw_word": word})
+    assert words.is_typed("withdraw_word", "rückzug") and words.is_typed("withdraw_word", "ru\u0308ckzug ")
+    assert not words.is_typed("withdraw_word", "ruckzug") and not words.is_typed("withdraw_word", "")
+
+
+def test_a_table_with_one_text_for_yes_and_no_is_refused():
+    (problem,) = find_table_problems({"no": "Yes "}, require_all=False)
+    assert str(problem).startswith("no is the text of yes")
