@@ -3,7 +3,7 @@
 An identified model is valid in a limited band only. Low band: inverse dynamics of a rigid model along a planned motion
 (`low_band`). Middle: linear-quadratic tracking with the identified model (`lqr`). High: one degree of freedom along the
 direction of the smallest peak force (`high_band`). The forces are added. Without edges in the split, all is middle
-band. Called by `narrow_and_wide_models`.
+band.
 
 Shapes: n rows of the reference, N rows with delays and padding, m axes of force (N), p axes of acceleration (m/s²). As
 many forces as accelerations are required, which is not checked: the force of the virtual spring, (N, p), is subtracted

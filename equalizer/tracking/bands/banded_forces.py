@@ -1,7 +1,6 @@
 """Result of the banded equalizer: forces, predicted accelerations, and loss of tracking due to the force cap.
 
-Made by `BandedEqualizer.compute_forces`, read by `narrow_and_wide_models`. N: rows, m: axes of force, p: axes of
-acceleration. Forces in N, accelerations in m/s², one row per sample.
+N: rows, m: axes of force, p: axes of acceleration. Forces in N, accelerations in m/s², one row per sample.
 """
 
 from dataclasses import dataclass

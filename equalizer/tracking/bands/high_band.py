@@ -4,8 +4,7 @@ Above the limit of direction perception a person perceives the strength of a vib
 reference acceleration is therefore reduced to a single signal of the same energy and played along a single direction d
 of force. With g the norm of the device's response G d at a spectral line and w the force weight, the magnitude of the
 force is that of the reduced reference times g / (g² + w). The direction is free: of those tried, that of the smallest
-peak force is chosen. Called by `banded_equalizer` and `narrow_and_wide_models`. Sizes: N samples, m forces, p
-responses.
+peak force is chosen. Sizes: N samples, m forces, p responses.
 """
 
 from dataclasses import dataclass

@@ -6,8 +6,8 @@ force
 
     F = M x'' + D x' + K x        of a rigid model (`rigid_model`)
 
-The filter is s² / (s² - w²), without phase error, where the whole acceleration is known beforehand; otherwise it is
-the causal s² / (s + w)². Called by `banded_equalizer`.
+The filter is s² / (s² - w²), without phase error, where the whole acceleration is known beforehand; otherwise it is the
+causal s² / (s + w)².
 """
 
 from dataclasses import dataclass

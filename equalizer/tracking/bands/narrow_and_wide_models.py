@@ -3,8 +3,7 @@
 Low band, below the narrow model's band: a rigid model fitted to the narrow model's lowest lines. Middle: the narrow
 model. High, above it: the wide model's response along one direction. Forces are played from the first to the last row
 of the reference; those of the low and the high band before and after it (run-in and run-out) are cut off. The middle
-band is then solved again for the reference minus the narrow model's response to what remains of them. Called by
-`equalize_trajectory` and `playback_models` of `study.workflows.equalizer`.
+band is then solved again for the reference minus the narrow model's response to what remains of them.
 """
 
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Below the first resonance the device moves as a rigid body. At a spectral line, with s = 2 pi i f,
 
     force per acceleration = M + D / s + K / s²        (m x m, N per m/s²)
-
-Called by `low_band`, `banded_equalizer` and `narrow_and_wide_models`.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """A separate vibration actuator at the stylus, which plays the highest frequencies in place of the motors.
 
 A crossover divides the reference acceleration between motors and actuator; the actuator's command is the reference
-share times the regularised inverse of its measured response, line by line. Called by `banded_equalizer`.
+share times the regularised inverse of its measured response, line by line.
 """
 
 from dataclasses import dataclass

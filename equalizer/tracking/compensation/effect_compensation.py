@@ -4,8 +4,7 @@ A linear model that was identified on a device with friction contains a linear e
 complete friction would count it twice. It is best to identify on recordings from which the effects were subtracted
 (`subtract_effects`). Where there is only a model, the equivalent for a sinusoid of the identification's amplitude
 (`compute_equivalent_impedance`, a describing function) is subtracted. This is an approximation: it does not describe an
-axis that stuck while another was swept. Called by `equalize_trajectory`; `subtract_effects` uses its functions for
-laws, axes and gains.
+axis that stuck while another was swept.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,6 @@
 """Role of each effect in a feedforward: compensated by a force, used for scaling or timing, or not compensated.
 
-The texts are shown to the user as the reason why an effect is not compensated. Called by `effect_compensation` and
-`subtract_effects`.
+The texts are shown to the user as the reason why an effect is not compensated.
 """
 
 import numpy as np

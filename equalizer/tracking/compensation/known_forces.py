@@ -3,8 +3,7 @@
 Each law F(parameters, x, v, slip_mps) takes the position x (m), the velocity v (m/s), (N,) each, and the speed (m/s)
 below which a change of sign is smoothed: sign(v) becomes tanh(v / slip_mps), with slip_mps above zero. It returns the
 force (N) that must be added to the command: the effect's own force with the opposite sign. For rotations the units are
-rad, rad/s and N m. Called by `effect_compensation` (feedforward) and `subtract_effects`; `effect_roles` reads which
-effects have a law. Reference for describing functions: Gelb and Vander Velde, Multiple-Input Describing Functions and
+rad, rad/s and N m. Reference for describing functions: Gelb and Vander Velde, Multiple-Input Describing Functions and
 Nonlinear System Design (1968).
 """
 
@@ -27,20 +26,6 @@ Chosen, to limit computing time."""
 def _smooth_sign(velocity: FloatArray, slip_mps: float) -> FloatArray:
     """Compute tanh(v / slip_mps) in place of sign(v), because a discontinuous force cannot be played."""
     return np.asarray(np.tanh(velocity / slip_mps))
-
-
-def _compute_coulomb_friction(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
-) -> FloatArray:
-    """Coulomb friction, F = level sign(v)."""
-    return parameters["level"] * _smooth_sign(v, slip_mps)
-
-
-def _compute_asymmetric_friction(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
-) -> FloatArray:
-    """Coulomb friction with a level for each direction of motion, the positive one where v > 0."""
-    return np.where(v > 0, parameters["level_positive"], parameters["level_negative"]) * _smooth_sign(v, slip_mps)
 
 
 def _compute_position_dependent_friction(
@@ -73,38 +58,19 @@ def _compute_presliding_hysteresis(
     return np.asarray(parameters["stiffness"] * deflections)
 
 
-def _compute_quadratic_damping(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
-) -> FloatArray:
-    """Quadratic damping, F = coefficient v |v|."""
-    return parameters["coefficient"] * v * np.abs(v)
-
-
-def _compute_hardening_stiffness(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
-) -> FloatArray:
-    """Cubic (Duffing) stiffness, F = k3 x³."""
-    return np.asarray(parameters["k3"] * x**3)
-
-
-def _compute_asymmetric_stiffness(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
-) -> FloatArray:
-    """Quadratic stiffness, F = k2 x²."""
-    return np.asarray(parameters["k2"] * x**2)
-
-
 LAWS: dict[str, ForceLaw] = {
-    "coulomb_friction": _compute_coulomb_friction,
-    "asymmetric_friction": _compute_asymmetric_friction,
+    "coulomb_friction": lambda parameters, x, v, slip_mps: parameters["level"] * _smooth_sign(v, slip_mps),
+    "asymmetric_friction": lambda parameters, x, v, slip_mps: (
+        np.where(v > 0, parameters["level_positive"], parameters["level_negative"]) * _smooth_sign(v, slip_mps)
+    ),
     "position_dependent_friction": _compute_position_dependent_friction,
     "stribeck_friction": _compute_stribeck_friction,
     "presliding_hysteresis": _compute_presliding_hysteresis,
-    "quadratic_damping": _compute_quadratic_damping,
-    "hardening_stiffness": _compute_hardening_stiffness,
-    "asymmetric_stiffness": _compute_asymmetric_stiffness,
+    "quadratic_damping": lambda parameters, x, v, slip_mps: parameters["coefficient"] * v * np.abs(v),
+    "hardening_stiffness": lambda parameters, x, v, slip_mps: parameters["k3"] * x**3,
+    "asymmetric_stiffness": lambda parameters, x, v, slip_mps: parameters["k2"] * x**2,
 }
-"""Laws by name of the effect."""
+"""Laws by name of the effect. `hardening_stiffness`: cubic (Duffing)."""
 
 
 def compute_equivalent_impedance(

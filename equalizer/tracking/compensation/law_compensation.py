@@ -3,8 +3,7 @@
 A discovered law is a formula that a diagnosis found because no effect of the catalogue explains the recordings. A law
 of the force is cancelled along the planned motion: -law(x, v, a) is added to the command. A law of the command (a
 static map g of a single command) is inverted: the command u with g(u) = intended force is sent. Laws of a sensor, and
-laws with memory of the command, are not compensated; `explain_law_not_compensated` gives the reason. Called by
-`effect_compensation` and `effect_roles`.
+laws with memory of the command, are not compensated; `explain_law_not_compensated` gives the reason.
 """
 
 from collections.abc import Mapping

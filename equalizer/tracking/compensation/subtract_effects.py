@@ -2,8 +2,7 @@
 
 The motion is integrated from the measured acceleration, the effects' forces are evaluated along it, and their
 compensating forces are subtracted from the commands. A model identified from the result describes the linear part only;
-`effect_compensation` then adds the complete forces of the effects. Called by
-`study.workflows.equalizer.recordings_without_effects`.
+`effect_compensation` then adds the complete forces of the effects.
 
 The friction force of an axis that sticks cannot be computed from its motion. All axes must therefore move all the time
 (multisines on all axes, well above friction), which excludes sweeps of one axis after the other.

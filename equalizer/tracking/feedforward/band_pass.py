@@ -1,8 +1,6 @@
 """Zero-phase band-pass filtering of a finite record, in the frequency domain.
 
 The gain is 1 within the band and has raised-cosine edges outside it, because a sharp edge would ring for seconds.
-Called by `learning.iteration`, `planned_motion`, the compensation of effects, `study.workflows.equalizer` and
-`analysis.device_change`.
 """
 
 import numpy as np

@@ -1,8 +1,7 @@
 """Commands for periodic outputs: the regularised (Tikhonov) inverse of a model's frequency response, line by line.
 
 In the steady state every spectral line is independent: with the response G from forces to outputs and the weight w, the
-forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the reference output y. Called by
-`model_equalizer` and `workspace.models_at_place`, among others.
+forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the reference output y.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
 """Motion of the handle for a given acceleration: velocity and position by integration in the frequency domain.
 
 The spectrum is divided by 2 pi i f, and by its square, within a band that excludes zero frequency; the position is
-therefore relative to the equilibrium. Called by the compensation of effects (`effect_compensation`, `subtract_effects`)
-and by `learning.model_inverse`.
+therefore relative to the equilibrium.
 """
 
 from dataclasses import dataclass

@@ -2,8 +2,7 @@
 
 T, (lines, p, p), is the response from reference to delivered accelerations; ideally it is the identity. A sinusoid
 along axis i is delivered as the ellipse Re(T[:, i] exp(j omega t)), j² = -1, whose major axis is the first left
-singular vector of the real p x 2 matrix (Re T[:, i], Im T[:, i]). Called by `interpolation_choice` and by the
-reproduction of the paper (`played_response`).
+singular vector of the real p x 2 matrix (Re T[:, i], Im T[:, i]).
 """
 
 from dataclasses import dataclass

@@ -6,7 +6,6 @@ spectral line is the worst-case share of the error that remains. Where it is bel
 error decreases monotonically.
 
 Reference: Bristow, Tharayil and Alleyne, A Survey of Iterative Learning Control, IEEE Control Systems 26 (2006), 96.
-Called by `workspace.convergence_at_place`.
 """
 
 from dataclasses import dataclass

@@ -5,8 +5,7 @@
 with fixed further forces f. By the alternating direction method of multipliers, ADMM (Boyd et al., Distributed
 Optimization and Statistical Learning via the Alternating Direction Method of Multipliers, 2011). Two steps alternate:
 tracking with stored gains, and projection of the forces on the cap. The multipliers give a lower bound of the optimal
-cost (duality), so that the distance from the optimum is known. Called by `feedforward.solve_causally` and
-`bands.banded_equalizer`.
+cost (duality), so that the distance from the optimum is known.
 """
 
 from dataclasses import dataclass, replace

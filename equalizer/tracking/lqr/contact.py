@@ -8,7 +8,7 @@ E(t) = sum_i n_i E_i(t), and its relative square in the model's band is the quad
 
 whose largest eigenvalue belongs to the worst normal. The optimal tracker is not causal: forces before the contact
 reduce the error, but at an unforeseen contact there are none. Comparison of `deviation` with `early_deviation` shows
-the cost of causality. Called by `study.workflows.equalizer.play_contact`.
+the cost of causality.
 """
 
 from dataclasses import dataclass

@@ -2,8 +2,7 @@
 
 Clipping would distort the reference acceleration without notice. The cap (N) limits the Euclidean norm of the force
 vector of each row, so that it holds in every direction. `project_to_cap` is the projection step of the iteration in
-`constrained` (ADMM), whose result satisfies the cap. Called by the modules that compute forces. Forces are arrays
-(N, m) in newtons: N rows (samples), m axes.
+`constrained` (ADMM), whose result satisfies the cap. Forces are arrays (N, m) in newtons: N rows (samples), m axes.
 """
 
 from dataclasses import dataclass

@@ -3,7 +3,7 @@
 The gains are those of the infinite horizon (`compute_stationary_gains`). Samples that are not known yet count as zero,
 the expected value of a zero-mean signal. A device without acceleration response to a constant force needs a long
 preview; a low-frequency weight (`TrackingWeights`) shortens it, at the cost of tracking error: `compute_preview_loss`
-computes the loss. Called by `realtime.realtime_controller`.
+computes the loss.
 """
 
 from dataclasses import dataclass

@@ -7,8 +7,8 @@ The equations are those of `lqr`, whose W_k is F here, with the Cholesky factor 
 
 Where the forces can cancel nearly all of the cost (feedthrough without force weight), P_k is a difference of nearly
 equal numbers: rounding may leave a negative eigenvalue, which each further step multiplies by the square of the model's
-unstable zeros. `riccati.compute_backward_gains`, which updates a factor of P, is used then. Called by `lqr`. All
-compiled functions that the recursion calls are in this file, because numba invalidates its cache by file.
+unstable zeros. `riccati.compute_backward_gains`, which updates a factor of P, is used then. All compiled functions that
+the recursion calls are in this file, because numba invalidates its cache by file.
 """
 
 import numpy as np

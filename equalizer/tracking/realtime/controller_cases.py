@@ -2,7 +2,7 @@
 
 The forces are computed by this package, for both parts of the controller (`make_realtime_controller`): the transient,
 with directions that change at each tick, and the stream, with noise as reference acceleration. All forces are below the
-cap. Called by `study.workflows.equalizer.controller.export_controller`; `c_source` there writes them as C.
+cap.
 """
 
 from dataclasses import dataclass

@@ -3,7 +3,6 @@
 A model may have more pole pairs in the band than the device has resonances there: several pairs may describe a single
 resonance, or the noise of the measurement. The model's poles therefore only give start values: a pole pair with
 residues for each resonance, and a smooth remainder with free coefficients, are fitted together to the model's response.
-Called by `modal_interpolation`, which interpolates the resonances between places after `mode_matching`.
 """
 
 from dataclasses import dataclass

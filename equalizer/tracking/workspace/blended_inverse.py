@@ -2,8 +2,7 @@
 modes and is the default.
 
 Forces are blended, not responses: where the frequency of a resonance changes with the place, the mean of two responses
-has two smaller resonances, and its inverse two notches. Called by `interpolation_choice` and
-`study.evaluation.reproduction`.
+has two smaller resonances, and its inverse two notches.
 """
 
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace

@@ -7,8 +7,7 @@ hence the closed loop
 
     a = (I - G K)^-1 G u.
 
-The condition of convergence is that of `equalizer.tracking.learning.convergence`. Called by
-`study.workflows.equalizer.repeat_trajectory`.
+The condition of convergence is that of `equalizer.tracking.learning.convergence`.
 """
 
 import numpy as np

@@ -1,7 +1,6 @@
 """Feedforward forces at a place of the workspace, by a single model or by the weighted sum of several models' forces.
 
-The models and weights come from an interpolation between places (`interpolation_choice`). Called by the workflows
-`equalize_trajectory` and `repeat_trajectory`.
+The models and weights come from an interpolation between places (`interpolation_choice`).
 """
 
 from dataclasses import replace

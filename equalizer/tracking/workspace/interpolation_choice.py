@@ -2,7 +2,7 @@
 
 At each held-out place, the response that was identified there is equalized by the interpolation from the other places.
 Modal interpolation is chosen if its largest error over the places is smaller than that of blended forces; blended
-forces where nothing can be checked. Called by `study.workflows.equalizer.playback_models`.
+forces where nothing can be checked.
 """
 
 from collections.abc import Sequence

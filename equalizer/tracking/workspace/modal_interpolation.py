@@ -3,8 +3,7 @@
 A weighted sum of responses would contain the resonances of every model. Here the resonances in the band are matched
 between models (`mode_matching`), and their natural frequencies, damping ratios and residues are interpolated. The
 remainder of each response without its resonances is smooth and is interpolated linearly. The sum is realised as a
-state-space model, with fixed real poles for the remainder. Called by `interpolation_choice` and
-`study.evaluation.reproduction`.
+state-space model, with fixed real poles for the remainder.
 
 Sizes: m inputs (forces), p outputs (accelerations).
 """

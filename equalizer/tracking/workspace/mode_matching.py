@@ -2,8 +2,7 @@
 
 A pair of modes costs |ln(f1 / f2)| / FREQUENCY_SCALE + 1 - MAC, with the natural frequencies f and the modal assurance
 criterion of their residue matrices (MAC; Allemang and Brown, IMAC 1982). The pairs with the least total cost are found
-as a linear assignment problem, in which a mode may also stay without a partner at a fixed cost. Called by
-`modal_interpolation`.
+as a linear assignment problem, in which a mode may also stay without a partner at a fixed cost.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
 """Models with weights for a place of the workspace: the forces there are the weighted sum of the models' forces.
 
 Result of an interpolation between places: a single model by `modal_interpolation`, models with weights by
-`blended_inverse`, chosen by `interpolation_choice`. Used by `feedforward_at_place` and `convergence_at_place`. Sizes: m
-inputs, p outputs of a model.
+`blended_inverse`, chosen by `interpolation_choice`. Sizes: m inputs, p outputs of a model.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,7 @@
 """Set of models of one device, each identified at a different place of its workspace, checked to be compatible.
 
 The response of a device changes with the pose of its mechanism; `modal_interpolation` and `blended_inverse` interpolate
-between the places. Made by `study.workflows.equalizer.playback_models`, from the models that the user gives, and by
-`study.evaluation.reproduction.reproduce_equalized`.
+between the places.
 """
 
 from dataclasses import dataclass
