@@ -95,12 +95,15 @@ def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
 MASS_BAND_HZ = (30.0, 60.0)
 """Band in Hz in which the response is nearly that of a mass: friction and springs matter below it, the modes of the
 linkage above it. Chosen by hand."""
+MAX_MASS_KG = 1e3
+"""Largest mass that an estimate gives, far above that of a hand on a handle; a sensor that is nearly silent shows a
+larger one. Chosen by hand."""
 
 
 def estimate_apparent_mass_kg(probe: ProbeLines) -> float:
     """Estimate the apparent mass in kg: median of the real part of force over acceleration, over the driven lines in
     `MASS_BAND_HZ`, on the axes that they drive. A hand on the handle adds to it. Raises ValueError where there is no
-    such line, or the median is not a positive number."""
+    such line, or the median is not a positive number up to `MAX_MASS_KG`."""
     low_hz, high_hz = MASS_BAND_HZ
     in_band = (probe.frequency_hz >= low_hz) & (probe.frequency_hz <= high_hz)
     line_indices, axis_indices = np.nonzero(probe.driven & in_band[:, None])
@@ -114,7 +117,7 @@ def estimate_apparent_mass_kg(probe: ProbeLines) -> float:
                 (probe.force_n[line_indices, axis_indices] / probe.acceleration_mps2[line_indices, axis_indices]).real
             )
         )
-    if not np.isfinite(mass_kg) or mass_kg <= 0:
+    if not 0 < mass_kg <= MAX_MASS_KG:
         raise ValueError("its acceleration does not follow the force: check the accelerometer and its cable")
     return mass_kg
 

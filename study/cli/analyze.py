@@ -1,7 +1,4 @@
-"""Command `hapteq analyze`: computes thresholds, ANOVA, figures and the report of all sessions in a folder.
-
-Parses the options and calls `study.workflows.results.analyze_data`. Loaded by `command_table`.
-"""
+"""Command `hapteq analyze`: computes thresholds, ANOVA, figures and the report of all sessions in a folder."""
 
 from pathlib import Path
 from typing import Annotated

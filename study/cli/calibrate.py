@@ -1,15 +1,11 @@
-"""Command `hapteq calibrate`: reads Jacobian, inertia and gravity of a device's linkage over its workspace.
+"""Command `hapteq calibrate`: reads Jacobian, inertia and gravity of a device's linkage over its workspace."""
 
-Parses the options and calls `study.workflows.recording.calibrate_linkage`. Loaded by `command_table`.
-"""
-
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_notes, print_summary
 from study.cli.session_options import DeviceOption
 
 
@@ -26,7 +22,7 @@ def calibrate(
     `hapteq twin --calibration CAL.h5` and `--device simulated:CAL.h5` use the result. (Another calibration, that of the
     encoders after each power-up, is `hapteq doctor --calibrate`.)
     """
-    from study.cli.progress import show_late_bar
+    from study.cli.progress import show_share
     from study.workflows.recording.calibrate_linkage import (
         CalibrationPlan,
         calibrate_linkage,
@@ -35,9 +31,7 @@ def calibrate(
     )
 
     plan = CalibrationPlan(out, device, radius, depth)
-    with show_late_bar("Calibration (%)", total=100) as show_percent:
-        calibration = calibrate_linkage(plan, lambda share: show_percent(round(100 * share)))
-    summary = json.dumps(summarise_calibration(calibration), indent=2)
-    typer.echo(summary if as_json else "\n".join((str(out), *format_calibration_lines(calibration))))
-    for warning in calibration.warnings:
-        typer.echo(f"Note: {warning}", err=True)
+    with show_share("Calibration") as on_progress:
+        calibration = calibrate_linkage(plan, on_progress)
+    print_summary(summarise_calibration(calibration), (str(out), *format_calibration_lines(calibration)), as_json)
+    print_notes(calibration.warnings)

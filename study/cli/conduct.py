@@ -1,7 +1,5 @@
 """Common part of the commands `hapteq study` and `hapteq resume` without the app: in line mode for a person, or with a
 simulated participant. Provides the participant, runs the sitting, and prints the results.
-
-Called by `study.cli.study` and `study.cli.resume`.
 """
 
 import hashlib

@@ -1,17 +1,15 @@
 """Command `hapteq contact`: plays a recorded acceleration transient along the normal of a contact, on the device.
 
 Parses the options, prints the notice before the device moves, and calls `study.workflows.equalizer.play_contact`.
-Loaded by `command_table`.
 """
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from study.cli.motion_notice import announce_motion
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_summary
 from study.cli.seed import check_seed
 from study.cli.session_options import DeviceOption, HandsOffOption
 
@@ -39,16 +37,10 @@ def contact(
     """
     from functools import partial
 
-    from study.cli.progress import show_late_bar
+    from study.cli.progress import show_share
     from study.workflows.equalizer.play_contact import ContactPlan, format_contact, play_contact, summarise_contact
 
     plan = ContactPlan(model, transient, normal, out, device, scale, weight, cap, seed)
-    with show_late_bar("Plays (%)", total=100) as show_percent:
-        playback = play_contact(
-            plan, lambda share: show_percent(round(100 * share)), partial(announce_motion, hands_off=hands_off)
-        )
-    typer.echo(
-        json.dumps(summarise_contact(playback), indent=2)
-        if as_json
-        else "\n".join((str(out), *format_contact(playback)))
-    )
+    with show_share("Plays") as on_progress:
+        playback = play_contact(plan, on_progress, partial(announce_motion, hands_off=hands_off))
+    print_summary(summarise_contact(playback), (str(out), *format_contact(playback)), as_json)

@@ -2,7 +2,7 @@
 
 Checks, in this order, the installation, the device with its sensor, and the timing of the 1 kHz loop, and prints the
 findings; by option it also calibrates the device or its accelerometer, accepts the device for use with a hand, or runs
-the daily check. Loaded by `command_table`.
+the daily check.
 """
 
 import json

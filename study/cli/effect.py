@@ -1,7 +1,4 @@
-"""Command `hapteq effect`: saves a discovered law (a formula of a missing force) as an effect for later diagnoses.
-
-Parses the options and calls `study.workflows.diagnosis.effect_file`. Loaded by `command_table`.
-"""
+"""Command `hapteq effect`: saves a discovered law (a formula of a missing force) as an effect for later diagnoses."""
 
 from pathlib import Path
 from typing import Annotated

@@ -4,14 +4,13 @@ Options and output only. The forces are computed by `study.workflows.equalizer.e
 repeated plays on the device (iterative learning, `--repeat`) by `study.workflows.equalizer.repeat_trajectory`.
 """
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from study.cli.motion_notice import announce_motion
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_summary
 from study.cli.seed import check_seed
 from study.cli.session_options import HandsOffOption
 
@@ -67,7 +66,7 @@ def equalize(
         if repeat is None or device is None
         else _repeat_on_device(plan, RepeatOptions(repeat, device, earlier, seed), hands_off)
     )
-    typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join((str(out), *lines)))
+    print_summary(summary, (str(out), *lines), as_json)
 
 
 def _check_arguments(files: list[Path], repeat: int | None, device: str | None, earlier: Path | None) -> None:

@@ -1,7 +1,4 @@
-"""Command `hapteq export`: writes the trials of a study as Psych-DS, BIDS, MATLAB or CSV files.
-
-Parses the options and calls `study.workflows.results.export_study`. Loaded by `command_table`.
-"""
+"""Command `hapteq export`: writes the trials of a study as Psych-DS, BIDS, MATLAB or CSV files."""
 
 import json
 from pathlib import Path

@@ -3,13 +3,12 @@
 Options and output only; `study.workflows.equalizer.controller.export_controller` writes the files.
 """
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_notes, print_summary
 
 
 def export_controller(
@@ -41,7 +40,5 @@ def export_controller(
 
     settings = make_controller_settings(weight, preview / 1000, cap)
     exported = export_controller(ControllerPlan(model, out, transient, settings))
-    for warning in warn_of_export(exported):
-        typer.echo(f"Note: {warning}", err=True)
-    summary = summarise_export(exported)
-    typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join(describe_export(exported)))
+    print_notes(warn_of_export(exported))
+    print_summary(summarise_export(exported), describe_export(exported), as_json)

@@ -5,13 +5,12 @@ the model, tests it on held-out data and writes it; a summary is printed, and re
 StudyError where the output exists or no model can be made from the recordings.
 """
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_notes, print_summary
 
 LimitOption = Annotated[
     Path | None,
@@ -59,10 +58,8 @@ def identify(
     require_new_output(out)
     with show_bar("Identifying (%)", total=100) as show_percent:
         device = identify_model(plan, lambda share: show_percent(round(100 * share)))
-    summary_lines = [json.dumps(summarise_model(device), indent=2)] if as_json else [str(out), *format_summary(device)]
-    typer.echo("\n".join(summary_lines))
-    for remark in device.remarks:
-        typer.echo(f"Note: {remark}", err=True)
+    print_summary(summarise_model(device), (str(out), *format_summary(device)), as_json)
+    print_notes(device.remarks)
     if report is not None:
         with show_bar("Report (%)", total=100) as show_percent:
             page_path = report_identification(device, report, lambda share: show_percent(round(100 * share)))

@@ -34,17 +34,14 @@ def import_recording(
     printed.
     """
     from study.cli.look import print_lines
-    from study.cli.progress import show_late_bar
+    from study.cli.progress import show_share
     from study.importing.map_format.map_errors import MapNeededError
-    from study.workflows.recording.import_recording import ImportPlan, require_new_output
+    from study.workflows.recording.import_recording import ImportPlan
     from study.workflows.recording.import_recording import import_recording as convert_files
 
-    require_new_output(out)
     try:
-        with show_late_bar("Importing (%)", total=100) as show_percent:
-            import_result = convert_files(
-                ImportPlan(tuple(files), map_name, out), lambda share: show_percent(round(100 * share))
-            )
+        with show_share("Importing") as on_progress:
+            import_result = convert_files(ImportPlan(tuple(files), map_name, out), on_progress)
     except MapNeededError as error:
         print_file_text(error.skeleton)
         raise

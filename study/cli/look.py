@@ -26,7 +26,7 @@ def look(
 ) -> None:
     """Show signals, spectra, coherence, levels and repeats; check units, clock, derivatives, lags, clipping and steps.
     Exit code 0 also where a check fails: that is a result."""
-    from study.cli.progress import show_late_bar
+    from study.cli.progress import show_share
     from study.workflows.recording.look_at_recordings import (
         inspect_recordings,
         list_import_notes,
@@ -34,8 +34,8 @@ def look(
         write_look_page,
     )
 
-    with show_late_bar("Looking (%)", total=100) as show_percent:
-        overviews = inspect_recordings(recordings, lambda share: show_percent(round(100 * share)))
+    with show_share("Looking") as on_progress:
+        overviews = inspect_recordings(recordings, on_progress)
     if as_json:
         typer.echo(json.dumps(make_look_document(overviews), indent=2))
     else:

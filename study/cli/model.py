@@ -3,14 +3,13 @@
 Options and output only; `study.workflows.diagnosis.fit_first_model` fits the model and writes the file.
 """
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from study.cli.diagnose import ForceConstantOption
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_notes, print_summary
 
 
 def model(
@@ -24,7 +23,7 @@ def model(
 
     `auto` compares structures by their error on held-out data, and states the reason for its choice.
     """
-    from study.cli.progress import show_late_bar
+    from study.cli.progress import show_share
     from study.workflows.diagnosis.fit_first_model import (
         FirstModelPlan,
         fit_and_write_first_model,
@@ -33,12 +32,7 @@ def model(
     )
 
     plan = FirstModelPlan(tuple(recordings), out, structure, tuple(force_constant or ()))
-    with show_late_bar("Model (%)", total=100) as show_percent:
-        fitted_model = fit_and_write_first_model(plan, lambda share: show_percent(round(100 * share)))
-    typer.echo(
-        json.dumps(summarise_first_model(fitted_model), indent=2)
-        if as_json
-        else "\n".join(format_first_model(fitted_model))
-    )
-    for remark in fitted_model.remarks:
-        typer.echo(f"Note: {remark}", err=True)
+    with show_share("Model") as on_progress:
+        fitted_model = fit_and_write_first_model(plan, on_progress)
+    print_summary(summarise_first_model(fitted_model), format_first_model(fitted_model), as_json)
+    print_notes(fitted_model.remarks)

@@ -1,7 +1,4 @@
-"""Notice that a real device is going to move, and its confirmation by Enter at the terminal.
-
-Called by the commands that move a device (`record`, `contact`, `equalize`, `twin`, `doctor`, `conduct`).
-"""
+"""Notice that a real device is going to move, and its confirmation by Enter at the terminal."""
 
 import sys
 

@@ -1,7 +1,4 @@
-"""Command `hapteq noise`: writes a sound file of pink masking noise, so that a participant does not hear the device.
-
-Parses the options and calls `study.workflows.session.write_masking_noise`. Loaded by `command_table`.
-"""
+"""Command `hapteq noise`: writes a sound file of pink masking noise, so that a participant does not hear the device."""
 
 from pathlib import Path
 from typing import Annotated

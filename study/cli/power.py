@@ -2,7 +2,7 @@
 
 Reads the protocol, makes the population from the options, simulates the studies on worker processes or a cluster
 (`study.workflows.planning.simulate_power`), and prints the power for each sample size. With --compare it prints the
-errors of staircase rules on the same simulated people instead. Loaded by its name in `study.cli.command_table`.
+errors of staircase rules on the same simulated people instead.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Progress bars on stderr, as context managers that yield a callback. Called by the commands that take long.
+"""Progress bars on stderr, as context managers that yield a callback.
 
 Without a terminal, as in a log, a bar is written once, when it ends; `show_steps` and `show_run_and_trial` write
 nothing.
@@ -58,6 +58,13 @@ def show_late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]
             return stack.enter_context(show_bar(title, total))
 
         yield lambda completed: start_bar()(completed)
+
+
+@contextmanager
+def show_share(title: str) -> Iterator[Callable[[float], None]]:
+    """Show a bar in percent as `show_late_bar` does. The yielded function takes the share done, 0 to 1."""
+    with show_late_bar(f"{title} (%)", total=100) as show_percent:
+        yield lambda share: show_percent(round(100 * share))
 
 
 @contextmanager

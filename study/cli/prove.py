@@ -3,14 +3,13 @@
 Options and output only; `study.evaluation.bank` draws, seals and diagnoses the devices and writes the results.
 """
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_summary
 from study.cli.scheduler import SchedulerOption, connect_cluster
 from study.cli.seed import check_seed
 
@@ -62,7 +61,7 @@ def prove(
     write_proof(proof)
     if table is not None:
         write_table(table, proof)
-    typer.echo(json.dumps(summarise_blind_test(proof), indent=2) if as_json else "\n".join(format_blind_test(proof)))
+    print_summary(summarise_blind_test(proof), format_blind_test(proof), as_json)
 
 
 def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path | None, as_json: bool) -> None:
@@ -71,7 +70,7 @@ def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path
     from study.evaluation.bank.laws.prove_laws import prove_laws
     from study.evaluation.bank.laws.write_law_proof import (
         format_law_lines,
-        format_law_summary,
+        summarise_law_blind_test,
         write_law_proof,
         write_law_table,
     )
@@ -80,7 +79,7 @@ def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path
     write_law_proof(law_proof)
     if table is not None:
         write_law_table(table, law_proof)
-    typer.echo(format_law_summary(law_proof) if as_json else "\n".join(format_law_lines(law_proof)))
+    print_summary(summarise_law_blind_test(law_proof), format_law_lines(law_proof), as_json)
 
 
 def _run_with_steps(run_test: Callable[[Callable[[str, int, int], None]], Result]) -> Result:

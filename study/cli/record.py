@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from study.cli.motion_notice import announce_motion
+from study.cli.results import print_notes
 from study.cli.seed import check_seed
 from study.cli.session_options import DeviceOption, HandsOffOption
 from study.errors import WrongUseError
@@ -61,5 +62,4 @@ def record(
             plan, on_progress=show, before_moving=partial(announce_motion, hands_off=hands_off, hand_on_handle=is_held)
         )
     typer.echo(str(recording.path))
-    for warning in recording.warnings:
-        typer.echo(f"Note: {warning}", err=True)
+    print_notes(recording.warnings)

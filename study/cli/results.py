@@ -1,8 +1,8 @@
 """Output of the commands' results: the option `--json`, and printing of a session's or a study's analysis."""
 
 import json
-from dataclasses import asdict
-from typing import Annotated
+from collections.abc import Iterable
+from typing import Annotated, Any
 
 import typer
 
@@ -14,15 +14,25 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Results as one JSON do
 def print_results(analysis: WrittenAnalysis, as_json: bool) -> None:
     """Print an analysis: as one JSON document on stdout, or its table on stdout, warnings and report path on stderr."""
     if as_json:
-        document = {
-            "thresholds": [asdict(threshold) for threshold in analysis.thresholds],
-            "warnings": list(analysis.warnings),
-            "report": str(analysis.report),
-        }
-        typer.echo(json.dumps(document, indent=2))
+        typer.echo(json.dumps(analysis.as_document(), indent=2))
         return
-    for line in analysis.table:
+    print_table(analysis.table, analysis.warnings, str(analysis.report))
+
+
+def print_table(table: Iterable[str], warnings: Iterable[str], report: str) -> None:
+    """Print the lines of a table on stdout, warnings and the path of the report on stderr."""
+    for line in table:
         typer.echo(line)
-    for warning in analysis.warnings:
-        typer.echo(f"Note: {warning}", err=True)
-    typer.echo(f"Report: {analysis.report}", err=True)
+    print_notes(warnings)
+    typer.echo(f"Report: {report}", err=True)
+
+
+def print_summary(summary: dict[str, Any], lines: Iterable[str], as_json: bool) -> None:
+    """Print a result on stdout: the summary as one JSON document, or else the lines, which say the same."""
+    typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join(lines))
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print each note as a line on stderr."""
+    for note in notes:
+        typer.echo(f"Note: {note}", err=True)

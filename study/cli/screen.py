@@ -12,18 +12,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from study.errors import DeviceError, ExitCode, StudyError, UserInterruptError, WrongUseError
-
 if TYPE_CHECKING:
     from study.tui.app.start_options import StartOptions
     from study.tui.engine.from_engine import Failed, Finished
-
-ERROR_TYPES: dict[int, type[StudyError]] = {
-    ExitCode.WRONG_USE: WrongUseError,
-    ExitCode.DEVICE: DeviceError,
-    ExitCode.INTERRUPTED: UserInterruptError,
-}
-"""Error class by exit code of a failed sitting; `StudyError` for any other code."""
 
 
 def has_screen() -> bool:
@@ -52,8 +43,8 @@ def print_file_text(text: str) -> None:
 
 
 def open_screen(options: "StartOptions", as_json: bool) -> None:
-    """Run the interface until it is closed, then print the results. Raises the StudyError of a failed sitting (class by
-    `ERROR_TYPES`), and typer.Exit for an exit code other than 0."""
+    """Run the interface until it is closed, then print the results. Raises the StudyError of a failed sitting, and
+    typer.Exit for an exit code other than 0."""
     from study.tui.app.app import HapteqApp
 
     app = HapteqApp(options)
@@ -73,13 +64,11 @@ def _print_outcome(outcome: "Finished | Failed | None", as_json: bool) -> None:
     if outcome is None:
         return
     if isinstance(outcome, Failed):
-        error = outcome.error
-        error_type = ERROR_TYPES.get(error.exit_code, StudyError)
-        raise error_type(error.title, error.happened, error.do_now, error.saved)
+        raise outcome.error
     results = outcome.results
-    for line in (results.document,) if as_json else results.table:
-        typer.echo(line)
-    if not as_json:
-        for warning in results.warnings:
-            typer.echo(f"Note: {warning}", err=True)
-        typer.echo(f"Report: {results.report}", err=True)
+    if as_json:
+        typer.echo(results.document)
+        return
+    from study.cli.results import print_table
+
+    print_table(results.table, results.warnings, results.report)

@@ -1,5 +1,4 @@
-"""Command `hapteq show`: print a session (facts, thresholds, staircases), a diagnosis, or a recording. Loaded by its
-name in `study.cli.command_table`.
+"""Command `hapteq show`: print a session (facts, thresholds, staircases), a diagnosis, or a recording.
 
 WHAT is taken as a recording file, else as a diagnosis (any other file, or a folder with diagnosis.json), else as a
 session.
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from study.cli.look import draw_recording_lines, print_lines
 from study.cli.results import JsonOption
 from study.cli.screen import read_terminal_width
 from study.cli.session_options import DataOption
@@ -53,19 +53,18 @@ def show(
         from study.workflows.views.view_diagnosis import make_diagnosis_view
 
         diagnosis = make_diagnosis_view(diagnosis_path)
-        _print_lines([json.dumps(asdict(diagnosis), indent=2)] if as_json else _format_diagnosis(diagnosis))
+        print_lines([json.dumps(asdict(diagnosis), indent=2)] if as_json else _format_diagnosis(diagnosis))
         return
     from study.local_clock import convert_to_machine_zone
     from study.session.views.local_time import to_utc
     from study.workflows.views.view_session import make_session_view
 
     session = make_session_view(_find_session_folder(target, data), to_utc if as_json else convert_to_machine_zone)
-    _print_lines([json.dumps(asdict(session), indent=2)] if as_json else _format_session(session, log))
+    print_lines([json.dumps(asdict(session), indent=2)] if as_json else _format_session(session, log))
 
 
 def _show_recording(path: Path, as_json: bool) -> None:
     """Print channels, segments and facts of a recording, or the same as JSON."""
-    from study.cli.look import draw_recording_lines, print_lines
     from study.workflows.recording.look_at_recordings import (
         inspect_recordings,
         list_recording_facts,
@@ -74,7 +73,7 @@ def _show_recording(path: Path, as_json: bool) -> None:
 
     overviews = inspect_recordings([path])
     if as_json:
-        _print_lines([json.dumps(make_look_document(overviews)[0], indent=2)])
+        print_lines([json.dumps(make_look_document(overviews)[0], indent=2)])
         return
     print_lines(
         [
@@ -154,9 +153,3 @@ def _format_diagnosis(view: "DiagnosisView") -> Iterable[str]:
         yield from ("", "Next", *(f"  {text_line}" for text_line in view.next_experiment.splitlines()))
     if view.report:
         yield f"\nReport: {view.report}"
-
-
-def _print_lines(lines: Iterable[str]) -> None:
-    """Print lines to standard output."""
-    for line in lines:
-        typer.echo(line)

@@ -3,14 +3,13 @@
 Options, notice before a real device moves, and output; `study.workflows.diagnosis.write_twin` records and fits.
 """
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from study.cli.motion_notice import announce_motion
-from study.cli.results import JsonOption
+from study.cli.results import JsonOption, print_notes, print_summary
 from study.cli.seed import check_seed
 from study.cli.session_options import DeviceOption, HandsOffOption
 
@@ -39,20 +38,13 @@ def twin(
     """
     from functools import partial
 
-    from study.cli.progress import show_late_bar
+    from study.cli.progress import show_share
     from study.workflows.diagnosis.twin_summary import format_twin_lines, summarise_twin
     from study.workflows.diagnosis.write_twin import TwinPlan, check_output_and_band, write_twin
 
     plan = TwinPlan(out, device, seed, protocol, band, calibration)
     check_output_and_band(plan)
-    with show_late_bar("Twin (%)", total=100) as show_percent:
-        fitted_twin = write_twin(
-            plan, lambda share: show_percent(round(100 * share)), partial(announce_motion, hands_off=hands_off)
-        )
-    typer.echo(
-        json.dumps(summarise_twin(fitted_twin), indent=2)
-        if as_json
-        else "\n".join((str(out), *format_twin_lines(fitted_twin)))
-    )
-    for note in fitted_twin.notes:
-        typer.echo(f"Note: {note}", err=True)
+    with show_share("Twin") as on_progress:
+        fitted_twin = write_twin(plan, on_progress, partial(announce_motion, hands_off=hands_off))
+    print_summary(summarise_twin(fitted_twin), (str(out), *format_twin_lines(fitted_twin)), as_json)
+    print_notes(fitted_twin.notes)

@@ -1,6 +1,6 @@
 """Command `hapteq watch`: the experimenter's view of a running session, and requests to it (stop, pause, notes).
 
-The view is a full screen, lines, or the present state once. Loaded by its name in `study.cli.command_table`.
+The view is a full screen, lines, or the present state once.
 """
 
 import json
@@ -47,7 +47,7 @@ def watch(
     """Follow a running session from a second terminal, without changing it; stop it, pause it, note something."""
     is_request = bool(stop or pause or note or adverse)
     if is_request:
-        folders = (_find_folder(session, data),) if session else _find_running(data)
+        folders = _find_requested(session, data) if session else _find_running(data)
         _send_requests(folders, stop, pause, ((note, False), (adverse, True)))
         return
     folder = _find_folder(session, data) if session else _find_last_changed(data)
@@ -68,6 +68,20 @@ def _find_folder(session: str, data: Path) -> Path:
     from study.store.sessions.archive import find_session
 
     return find_session(session, data).path
+
+
+def _find_requested(session: str, data: Path) -> tuple[Path, ...]:
+    """Find the folders of a session to which a request is sent. Where both a path and a session in `data` have this
+    name, those that may be running: a stop must reach the handle that moves. Raises as `_find_folder`, and
+    WrongUseError where neither of both runs."""
+    from study.store.sessions.archive import require_single_folder
+    from study.store.sessions.log_lock import is_log_locked
+
+    logs = [path / LOG_NAME for path in (Path(session), data / session)]
+    running = [log.parent.resolve() for log in logs if log.is_file() and is_log_locked(log) is not False]
+    if not running:
+        require_single_folder(session, data)
+    return tuple(dict.fromkeys(running)) or (_find_folder(session, data),)
 
 
 def _find_last_changed(data: Path) -> Path:

@@ -37,8 +37,11 @@ def withdraw(
     typer.echo(f"To be erased for good, in {data_folder}: {', '.join(plan.sessions)}{analysis_note}", err=True)
     for sentence in plan.doubtful:
         typer.echo(f"Not to be erased: {sentence}", err=True)
-    if not yes and not _ask_whether_to_erase():
-        typer.echo("Nothing was erased.", err=True)
+    kept = "Nothing was erased."
+    if folder.withdrawal.exists():
+        kept = f"Nothing more was erased; no session of {plan.subject} counts as data any more."
+    if not yes and not _ask_whether_to_erase(kept):
+        typer.echo(kept, err=True)
         return
     erased = erase(data_folder, plan, RealClock().utc())
     typer.echo(f"Erased: {', '.join(erased.sessions)}")
@@ -49,8 +52,9 @@ def withdraw(
         typer.echo(sentence, err=True)
 
 
-def _ask_whether_to_erase() -> bool:
-    """Ask for the confirmation. Raises UserInterruptError at Ctrl-C and at the end of the input."""
+def _ask_whether_to_erase(kept: str) -> bool:
+    """Ask for the confirmation. kept: what is told without one. Raises UserInterruptError at Ctrl-C and at the end of
+    the input."""
     from study.errors import UserInterruptError
 
     try:
@@ -60,5 +64,5 @@ def _ask_whether_to_erase() -> bool:
             "Not confirmed",
             "The question was not answered.",
             "Run the command again, or with --yes, which does not ask.",
-            saved="Nothing was erased.",
+            saved=kept,
         ) from interruption

@@ -6,31 +6,26 @@ The word differs between states, so that the status can be read without seeing c
 from study.session.views.archive_views import INELIGIBILITY_REASONS, SessionLine, SessionStatus
 from study.session.views.count_text import format_count
 
-SYMBOLS: dict[SessionStatus, str] = {
-    "finished": "✓",
-    "unfinished": "◐",
-    "running": "▶",
-    "refused": "○",
-    "excluded": "○",
-    "withdrawn": "✕",
-    "unreadable": "!",
+_SYMBOLS_AND_STYLES: dict[SessionStatus, tuple[str, str]] = {
+    "finished": ("✓", "$text-success"),
+    "unfinished": ("◐", "$text-warning"),
+    "running": ("▶", "bold $text-accent"),
+    "refused": ("○", "$foreground 65%"),
+    "excluded": ("○", "$foreground 65%"),
+    "withdrawn": ("✕", "$foreground 65%"),
+    "unreadable": ("!", "$text-error"),
 }
-
-STYLES: dict[SessionStatus, str] = {
-    "finished": "$text-success",
-    "unfinished": "$text-warning",
-    "running": "bold $text-accent",
-    "refused": "$foreground 65%",
-    "excluded": "$foreground 65%",
-    "withdrawn": "$foreground 65%",
-    "unreadable": "$text-error",
-}
-"""Textual style of symbol and word, with theme variables."""
+"""Symbol of a status, and the Textual style of symbol and word, with theme variables."""
 
 
 def format_status(status: SessionStatus) -> str:
     """Format a status as symbol and word."""
-    return f"{SYMBOLS[status]} {status}"
+    return f"{_SYMBOLS_AND_STYLES[status][0]} {status}"
+
+
+def find_status_style(status: SessionStatus) -> str:
+    """Find the Textual style of a status."""
+    return _SYMBOLS_AND_STYLES[status][1]
 
 
 def describe_session(session: SessionLine) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from analysis.figures.picture import Picture, remove_figure, render_picture_svg
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import convert_write_errors
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import write_text
 from study.workflows.forked_map import map_forked
@@ -55,10 +55,8 @@ def _render_svg_and_png(picture: Picture) -> tuple[str, bytes]:
 def write_drawn_pictures(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -> None:
     """Write drawn pictures into `folder`, as `write_pictures` does. Raises CannotWriteError where a file cannot be
     written."""
-    try:
+    with convert_write_errors(folder):
         make_folder(folder)
-    except OSError as error:
-        raise CannotWriteError(folder, error) from error
     for drawn_picture in drawn_pictures:
         write_text(
             folder / f"{drawn_picture.picture.name}.svg", render_picture_svg(drawn_picture.picture), overwrite=True

@@ -12,6 +12,8 @@ from pathlib import Path
 from study.devices.device import DeviceInfo
 from study.devices.force_dimension.lab import locate_lab_file
 from study.errors import DeviceError
+from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
+from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-acceptance", 1
 """Values by which the file and its version are recognised."""
@@ -70,7 +72,7 @@ def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
     device, serial number, firmware or SDK, or where `today` is before the acceptance or after its validity."""
     path = locate_acceptance_file()
     try:
-        document = json.loads(path.read_text("utf-8"))
+        document = load_json(read_regular(path, MAX_DOCUMENT_BYTES))
         accepted_on = date.fromisoformat(document["accepted_on"])
         accepted_device = (document["format"], document["version"], document["device"], document["details"])
         baseline = (str(document.get("baseline", "")), str(document.get("baseline_sha256", "")))

@@ -22,7 +22,9 @@ from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.sources import open_source
 from study.devices.onset_line import PulseSettings
-from study.errors import DeviceError
+from study.errors import DeviceError, StudyError
+from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
+from study.store.disk.atomic_write import write_atomically
 
 Triple = tuple[float, float, float]
 """Three numbers, for three channels or three axes."""
@@ -101,7 +103,7 @@ def read_lab_settings() -> LabSettings:
     cannot be read or is not valid."""
     path = locate_lab_file()
     try:
-        text = path.read_text("utf-8-sig")
+        text = read_regular(path, MAX_DOCUMENT_BYTES).decode("utf-8-sig")
     except FileNotFoundError:
         return LabSettings()
     except (OSError, UnicodeDecodeError) as error:
@@ -125,24 +127,23 @@ def _parse_settings(text: str) -> LabSettings:
 
 def write_sensor_table(sensor_table: str) -> Path:
     """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
-    previous file, if not empty, is kept as `NAME.before`. Raises `DeviceError`, with the table as its remedy, where the
-    file cannot be read or written, or the new content is not valid."""
+    previous file, if not empty, is copied to `NAME.before`, and stays in place until the new one is complete. Raises
+    `DeviceError`, with the table as its remedy, where the file cannot be read or written, or the new content is not
+    valid."""
     path = locate_lab_file()
     try:
         read_lab_settings()
-        previous_text = path.read_text("utf-8-sig") if path.exists() else ""
-        text = _replace_sensor_table(previous_text, sensor_table)
+        previous_content = path.read_bytes() if path.exists() else b""
+        text = _replace_sensor_table(previous_content.decode("utf-8-sig"), sensor_table)
         _parse_settings(text)
         path.parent.mkdir(parents=True, exist_ok=True)
-        new_path = path.with_name(f"{path.name}.new")
-        new_path.write_text(text, "utf-8")
-        if previous_text:
-            path.replace(path.with_name(f"{path.name}.before"))
-        new_path.replace(path)
-    except (DeviceError, OSError, ValueError) as error:
+        if previous_content:
+            write_atomically(path.with_name(f"{path.name}.before"), previous_content, overwrite=True)
+        write_atomically(path, text.encode(), overwrite=True)
+    except (StudyError, OSError, ValueError) as error:
         cause = (
             f"{error.title}. {error.happened}"
-            if isinstance(error, DeviceError)
+            if isinstance(error, StudyError)
             else f"{path} could not be written: {error}."
         )
         remedy = f"Put this table into that file by hand (docs/hardware.md):\n{sensor_table}"

@@ -49,7 +49,11 @@ def seal(folder: ProofFolder) -> str:
     Raises StudyError where a sealed label is missing or changed, or the file is malformed.
     """
     sealed_hashes = read_seals(folder)
-    if changed_names := [name for name, digest in sealed_hashes.items() if _hash_file(folder.path / name) != digest]:
+    if changed_names := [
+        name
+        for name, digest in sealed_hashes.items()
+        if not (folder.path / name).exists() or compute_sha256(folder.path / name) != digest
+    ]:
         raise make_broken_seal_error(changed_names, folder.path)
     new_labels = [path for path in folder.labels if f"sealed/{path.name}" not in sealed_hashes]
     lines = [f"{digest}  {name}\n" for name, digest in sealed_hashes.items()]
@@ -114,8 +118,3 @@ def make_broken_seal_error(names: list[str], path: Path) -> StudyError:
         "Run the bank again in another folder; this one proves nothing.",
         saved="Nothing was changed.",
     )
-
-
-def _hash_file(path: Path) -> str:
-    """Compute the SHA-256 of a file; empty where there is none."""
-    return compute_sha256(path) if path.exists() else ""

@@ -5,7 +5,7 @@ The effects themselves are in `effects`; `draw_case` draws them and builds them 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -80,6 +80,11 @@ def replace_cells(table: FloatArray, axis: int | slice, cells: Mapping[int, Floa
     for column, value in cells.items():
         new_table[axis, column] = value
     return new_table
+
+
+def replace_sensor(device: Device, parameters: Mapping[str, Any]) -> Device:
+    """Replace parameters of the sensor, given by name; returns a new device."""
+    return replace(device, sensor=replace(device.sensor, **parameters))
 
 
 def replace_handle_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device:

@@ -36,11 +36,6 @@ def _make_ideal_amplifiers() -> FloatArray:
     return amplifiers
 
 
-def _make_zero_play() -> FloatArray:
-    """Make the backlash parameters (5,) with axis -1: no axis has play."""
-    return np.array([-1.0, 0.0, 0.0, 0.0, 0.0])
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Device:
     """Parameters of bench, actuators, mechanism and sensor. The columns of the arrays are named in the kernels that
@@ -60,8 +55,8 @@ class Device:
     """(3,), kg/m: change of the mass for motion along an axis with the position along it"""
     modulation: FloatArray = field(default_factory=lambda: np.zeros((3, 5)))
     """(3, 5), time-varying damping and stiffness, columns in `mechanism_kernel`"""
-    play: FloatArray = field(default_factory=_make_zero_play)
-    """(5,), backlash, columns in `mechanism_kernel`"""
+    play: FloatArray = field(default_factory=lambda: np.array([-1.0, 0.0, 0.0, 0.0, 0.0]))
+    """(5,), backlash, columns in `mechanism_kernel`; axis -1: no axis has play"""
     creep_stiffness: FloatArray = field(default_factory=lambda: np.zeros((3, 1)))
     """(3, elements), N/m: springs to the ground, each in series with a damper"""
     creep_time_s: FloatArray = field(default_factory=lambda: np.ones(1))

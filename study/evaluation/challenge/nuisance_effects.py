@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.evaluation.challenge.concealed_effect import replace_cells
+from study.evaluation.challenge.concealed_effect import replace_cells, replace_sensor
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.friction_kernel import BRISTLE_STIFFNESS, LEVEL_NEGATIVE, LEVEL_POSITIVE
 from study.evaluation.challenge.handle_force_kernel import (
@@ -85,12 +85,12 @@ def _shift_mode_frequencies(device: Device, factor: float, random: np.random.Gen
 def _add_cross_axis_sensitivity(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Add a cross-axis sensitivity of the accelerometer of up to 0.3 %, of either sign."""
     sensitivity_matrix = device.sensor.orientation + factor * random.uniform(-3e-3, 3e-3, (3, 3)) * (1.0 - np.eye(3))
-    return replace(device, sensor=replace(device.sensor, orientation=sensitivity_matrix))
+    return replace_sensor(device, {"orientation": sensitivity_matrix})
 
 
 def _add_hum(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Set the mains hum in the acceleration: sine and cosine amplitudes of up to 0.004 m/s² per channel."""
-    return replace(device, sensor=replace(device.sensor, hum_mps2=factor * random.uniform(-0.004, 0.004, (2, 3))))
+    return replace_sensor(device, {"hum_mps2": factor * random.uniform(-0.004, 0.004, (2, 3))})
 
 
 NUISANCE_EFFECTS: tuple[NuisanceEffect, ...] = (

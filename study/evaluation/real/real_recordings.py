@@ -43,7 +43,7 @@ from study.evaluation.real.write_real import (
 )
 from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import CannotWriteError, convert_write_errors
 from study.store.disk.folder_contents import FileContents, read_files, write_files
 from study.store.disk.new_folder import create_new_folder
 from study.store.disk.provenance import Provenance
@@ -149,10 +149,8 @@ def _list_recordings(plan: RealPlan) -> RealFolder:
 
 def _create_output_folder(out: Path) -> None:
     """Create the output folder before any diagnosis. Raises CannotWriteError, also where it is not writable."""
-    try:
+    with convert_write_errors(out):
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise CannotWriteError(out, problem) from problem
     if not os.access(out, os.W_OK | os.X_OK):
         raise CannotWriteError(out / PAGE_NAME, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
@@ -293,8 +291,6 @@ def _write_diagnosis(folder: Path, result: RealDiagnosis, origin: Provenance) ->
 
 def _create_folder_with_parents(folder: Path) -> AbstractContextManager[Path]:
     """Create a new folder as `create_new_folder` does, and its parents. Raises StudyError."""
-    try:
+    with convert_write_errors(folder):
         folder.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise CannotWriteError(folder, problem) from problem
     return create_new_folder(folder)

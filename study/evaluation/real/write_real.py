@@ -9,7 +9,7 @@ from analysis.evaluation.blind_test.injected_faults import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import make_real_picture
 from analysis.reports.real_report import UnusableInput, render_real_report
 from study.store.disk.csv_rows import format_csv_table
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import convert_write_errors
 from study.store.disk.provenance import gather_provenance
 from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
@@ -109,20 +109,13 @@ def write_real_results(folder: Path, results: RealResults, generated: str) -> Wr
             overwrite=True,
         )
     else:
-        _delete_stale_table(folder / INJECTED_TABLE_NAME)
+        with convert_write_errors(folder / INJECTED_TABLE_NAME):
+            (folder / INJECTED_TABLE_NAME).unlink(missing_ok=True)  # of an earlier run
     page = render_real_report(
         results.answers, results.troubles, results.injected, pictures, provenance_texts, generated
     )
     write_text(folder / PAGE_NAME, page, overwrite=True)
     return WrittenReal(results, folder / PAGE_NAME, folder / TABLE_NAME)
-
-
-def _delete_stale_table(path: Path) -> None:
-    """Delete a table of an earlier run, if any. Raises CannotWriteError."""
-    try:
-        path.unlink(missing_ok=True)
-    except OSError as error:
-        raise CannotWriteError(path, error) from error
 
 
 def _make_row(real_answer: RealAnswer) -> RealRow:

@@ -27,7 +27,7 @@ from study.evaluation.reproduction.reproduce_recordings import CachedRecording, 
 from study.evaluation.reproduction.reproduction_plan import INTERMEDIATE_PLACES, ReproductionPlan, StepProgress
 from study.evaluation.reproduction.reproduction_results import ReproductionResults
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
-from study.store.disk.file_errors import CannotWriteError, UnusableFileError
+from study.store.disk.file_errors import UnusableFileError, convert_write_errors
 from study.store.disk.provenance import compute_sha256
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.protocol_files import read_study_protocol
@@ -162,10 +162,8 @@ def _estimate_step_durations_s(
 def _make_folders(plan: ReproductionPlan) -> None:
     """Make the folders of sessions, recordings and models. Raises CannotWriteError."""
     for folder in (plan.study, plan.recordings, plan.models):
-        try:
+        with convert_write_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as problem:
-            raise CannotWriteError(folder, problem) from problem
 
 
 def _rehearse_study(plan: ReproductionPlan, steps: StepProgress) -> CollectedTrials:

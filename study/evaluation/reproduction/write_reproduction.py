@@ -1,5 +1,4 @@
-"""Write the results of a reproduction to its folder: figures, document of numbers (JSON), page (HTML). Called by
-`reproduce_paper`."""
+"""Write the results of a reproduction to its folder: figures, document of numbers (JSON), page (HTML)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

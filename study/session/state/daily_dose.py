@@ -13,6 +13,10 @@ from study.session.facts.sitting_events import DoseElsewhere
 from study.session.state.sitting_state import DAILY_REST_S, SittingState, pass_time
 from study.session.state.vibration_dose import NO_DOSE, Dose, sum_doses
 
+MAX_LOGGED_DOSE = 1e9
+"""Largest dose that the log holds, (m/s²)² s (`fact_types.Magnitude`): A(8) = 186 m/s², far above any limit. Only a
+sensor whose sensitivity is set wrong gives more."""
+
 
 def find_dose_elsewhere(
     sessions: Mapping[str, SittingState], current_session: str, utc: str, unread_sessions: tuple[str, ...] = ()
@@ -43,9 +47,10 @@ def find_dose_elsewhere(
     if not counted_sessions:
         return DoseElsewhere((), 0.0, 0.0, 0.0, 0.0, unread_sessions) if unread_sessions else None
     dose = sum_doses(*(sitting.dose for sitting in counted_sessions.values()))
+    squared_s = min(dose.squared_s, MAX_LOGGED_DOSE)
     still_s = min(sitting.still_s or 0.0 for sitting in counted_sessions.values())
     return DoseElsewhere(
-        tuple(sorted(counted_sessions)), dose.squared_s, dose.vibrated_s, dose.unmeasured_s, still_s, unread_sessions
+        tuple(sorted(counted_sessions)), squared_s, dose.vibrated_s, dose.unmeasured_s, still_s, unread_sessions
     )
 
 

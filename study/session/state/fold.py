@@ -37,10 +37,8 @@ from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, apply
 from study.session.state.rules import is_place_assigned_later
 from study.session.state.sitting_state import (
     add_exposure,
-    apply_device_check,
     apply_form,
     estimate_amplitude_mps2,
-    finish_demo,
     pass_time,
     resume_sitting,
     start_motion,
@@ -158,9 +156,9 @@ def _apply_preparation(
         case FormFilled():
             return replace(state, sitting=apply_form(state.sitting, event))
         case DeviceChecked():
-            return replace(state, sitting=apply_device_check(state.sitting, event))
+            return replace(state, sitting=replace(state.sitting, device_checked=event.passed))
         case DemoFinished():
-            return replace(state, sitting=finish_demo(state.sitting, event))
+            return replace(state, sitting=replace(state.sitting, demo_done=True))
         case DemoPlayed():
             amplitude_mps2 = estimate_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
             sitting = add_exposure(start_motion(state.sitting), event.frequency_hz, amplitude_mps2, event.seconds)

@@ -13,7 +13,7 @@ from typing import Literal
 
 from protocols.trial import Trial
 from study.session.facts.log_time import ClockStep, Moment, compute_elapsed_s, find_clock_step
-from study.session.facts.sitting_events import DemoFinished, DeviceChecked, FormFilled
+from study.session.facts.sitting_events import FormFilled
 from study.session.state.probe_state import ProbeState
 from study.session.state.vibration_dose import NO_DOSE, Dose, add_sinusoid, sum_doses
 
@@ -99,16 +99,6 @@ def apply_form(sitting: SittingState, event: FormFilled) -> SittingState:
             return replace(sitting, setup_done=True)
         case "debrief":
             return replace(sitting, debriefed=True)
-
-
-def apply_device_check(sitting: SittingState, event: DeviceChecked) -> SittingState:
-    """Return the state after a device check; a failed check revokes an earlier passed one."""
-    return replace(sitting, device_checked=event.passed)
-
-
-def finish_demo(sitting: SittingState, event: DemoFinished) -> SittingState:
-    """Return the state after the demonstration."""
-    return replace(sitting, demo_done=True)
 
 
 def resume_sitting(sitting: SittingState, answers: int) -> SittingState:

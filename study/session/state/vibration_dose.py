@@ -69,10 +69,8 @@ def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, 
     extended_dose = replace(dose, vibrated_s=dose.vibrated_s + duration_s)
     if amplitude_mps2 is None:
         return replace(extended_dose, unmeasured_s=dose.unmeasured_s + duration_s)
-    return replace(
-        extended_dose,
-        squared_s=dose.squared_s + _compute_weighted_rms_mps2(frequency_hz, amplitude_mps2) ** 2 * duration_s,
-    )
+    weighted_rms_mps2 = compute_hand_arm_weight(frequency_hz) * amplitude_mps2 / math.sqrt(2)
+    return replace(extended_dose, squared_s=dose.squared_s + weighted_rms_mps2**2 * duration_s)
 
 
 def sum_doses(*doses: Dose) -> Dose:
@@ -88,8 +86,3 @@ def compute_a8_mps2(dose: Dose) -> float:
     """Compute the daily exposure A(8): the constant weighted rms acceleration (m/s^2) over eight hours with the same
     dose."""
     return math.sqrt(dose.squared_s / WORKING_DAY_S)
-
-
-def _compute_weighted_rms_mps2(frequency_hz: float, amplitude_mps2: float) -> float:
-    """Compute the weighted rms acceleration (m/s^2) of a sinusoid with this peak."""
-    return compute_hand_arm_weight(frequency_hz) * amplitude_mps2 / math.sqrt(2)

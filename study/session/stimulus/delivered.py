@@ -20,6 +20,10 @@ MAX_HAND_STIFFNESS_N_PER_M, MAX_HAND_DAMPING_N_S_PER_M, MAX_HAND_MASS_KG = 2000.
 """Assumed upper limits of the hand's stiffness (N/m), damping (N s/m) and mass (kg). Chosen: more than four times those
 of a whole arm (135 N/m, 6.5 N s/m, 0.55 kg; Scientific Reports, doi 10.1038/srep18004)."""
 
+MAX_AMPLITUDE_MPS2 = 1e5
+"""Largest amplitude (m/s²) that counts as measured; one above it shows a sensor whose sensitivity is set wrong, and
+might exceed the range of a log. Chosen: 10,000 times gravity."""
+
 MIN_EXPECTED_MPS2 = 0.1
 """Smallest expected acceleration (m/s²) at which `has_too_little_motion` can be true. Chosen: a smaller one could be
 masked by the sensor's noise."""
@@ -42,20 +46,23 @@ class DeliveredMotion:
 
 def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> DeliveredMotion | None:
     """Measure the amplitudes in a trial's recording, by a least-squares fit of a sinusoid at the stimulus frequency;
-    None if less than one period was measured. unit_vector: (3,), the direction played."""
+    None if less than one period was measured, or an acceleration above `MAX_AMPLITUDE_MPS2`. unit_vector: (3,), the
+    direction played."""
     measured_samples = int(np.isfinite(recording.response.samples).all(axis=1).sum())
     if not covers_a_period(measured_samples, recording.sample_rate_hz, frequency_hz):
         return None
     acceleration_phasor = estimate_phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz)[0]
     along_phasor = acceleration_phasor @ unit_vector
     off_axis_phasor = acceleration_phasor - along_phasor * unit_vector
-    return DeliveredMotion(
+    delivered = DeliveredMotion(
         along_mps2=float(np.abs(along_phasor)),
         off_axis_mps2=float(np.linalg.norm(off_axis_phasor)),
         # From the accelerometer at the handle, because the encoders measure behind elastic cables.
         displacement_mm=1000.0 * float(np.abs(along_phasor)) / (2 * np.pi * frequency_hz) ** 2,
         harmonics_mps2=_measure_harmonics_mps2(recording, frequency_hz),
     )
+    amplitudes_mps2 = (delivered.along_mps2, delivered.off_axis_mps2, delivered.harmonics_mps2 or 0.0)
+    return delivered if all(amplitude <= MAX_AMPLITUDE_MPS2 for amplitude in amplitudes_mps2) else None
 
 
 def has_too_little_motion(

@@ -104,12 +104,12 @@ def parse_number(answer: str) -> float | None:
 
 def encode_answers(form: Form, reply: FormReply) -> dict[str, str]:
     """Encode the answers for the log, the same in every language: choices as their codes, numbers with a decimal point
-    and 10 significant digits, free text without surrounding spaces, missing answers as empty text."""
+    and all digits of a float, free text without surrounding spaces, missing answers as empty text."""
     encoded_answers = {}
     for field in form.fields:
         answer = reply.answers.get(field.key, "").strip()
         number = parse_number(answer) if field.limits is not None else None
         if field.codes and answer in field.choices:
             answer = field.codes[field.choices.index(answer)]
-        encoded_answers[field.key] = answer if number is None else f"{number:.10g}"
+        encoded_answers[field.key] = answer if number is None else repr(number).removesuffix(".0")
     return encoded_answers

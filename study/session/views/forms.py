@@ -113,12 +113,12 @@ def is_confirmed(confirmation: Form, reply: FormReply) -> bool:
 
 def _make_yes_no_field(key: str, label: str, words: Words) -> FormField:
     """Make a question to be answered by yes or no."""
-    return FormField(key, label, tuple(words[word_key] for word_key in YES_NO), codes=YES_NO)
+    return _make_choice_field(key, label, {code: code for code in YES_NO}, words)
 
 
 def _make_choice_field(key: str, label: str, choices: dict[str, str], words: Words) -> FormField:
     """Make a question with choices. choices: key of the text by logged code."""
-    return FormField(key, label, tuple(words[word_key] for word_key in choices.values()), codes=tuple(choices))
+    return FormField(key, label, tuple(words[word_key].strip() for word_key in choices.values()), codes=tuple(choices))
 
 
 def _make_consent_form(protocol: StudyProtocol, words: Words) -> Form:
@@ -219,5 +219,5 @@ def _make_question_field(question: Question, words: Words) -> FormField:
         steps = {"lowest": question.scale[0], "highest": question.scale[1]}
         label = f"{label} ({words.fill('form_scale', {**steps, **meaning})})"
     limits = NumberLimits(*question.number) if question.number else None
-    choices = question.choices or question.steps
+    choices = tuple(choice.strip() for choice in question.choices or question.steps)  # as answers are
     return FormField(question.key, label, choices, needed=False, codes=question.codes, limits=limits)

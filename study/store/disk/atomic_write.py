@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError, NotSyncedError
+from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError, NotSyncedError, convert_write_errors
 from study.store.disk.privacy import choose_file_mode
 
 
@@ -43,13 +43,11 @@ def reserve_space(path: Path, size_bytes: int) -> Iterator[None]:
     temporary_path = _name_temporary(path)
     descriptor = -1
     try:
-        try:
+        with convert_write_errors(path):
             descriptor = os.open(temporary_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, choose_file_mode(path.parent))
             with suppress(OSError):  # without a name nothing remains of it, however the program ends (not on Windows)
                 temporary_path.unlink()
             _allocate(descriptor, path.absolute().parent, size_bytes)
-        except OSError as problem:
-            raise CannotWriteError(path, problem) from problem
         yield
     finally:
         if descriptor >= 0:

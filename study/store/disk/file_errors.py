@@ -9,9 +9,12 @@ import struct
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 
+from equalizer.signals.listed_problems import ListedProblemsError
 from study.errors import StudyError
 from study.regular_file import RefusedFileError
 
@@ -53,6 +56,16 @@ class UnusableFileError(StudyError):
         )
 
 
+@contextmanager
+def convert_problems(path: Path, kind: str) -> Iterator[None]:
+    """Context that converts a ListedProblemsError to an UnusableFileError for this file with the same problems. kind:
+    name of such files in messages."""
+    try:
+        yield
+    except ListedProblemsError as error:
+        raise UnusableFileError(path, kind, error.problems) from error
+
+
 class CannotReadError(StudyError):
     """A file is missing, cannot be opened or read, or is no text in UTF-8 where text is expected."""
 
@@ -76,6 +89,15 @@ class CannotWriteError(StudyError):
             do_now=remedy,
         )
         self.problem = problem
+
+
+@contextmanager
+def convert_write_errors(path: Path) -> Iterator[None]:
+    """Context that converts an OSError to a CannotWriteError for this file or folder."""
+    try:
+        yield
+    except OSError as problem:
+        raise CannotWriteError(path, problem) from problem
 
 
 class NotSyncedError(StudyError):

@@ -4,7 +4,7 @@ common disk."""
 from collections.abc import Mapping
 from pathlib import Path
 
-from study.store.disk.file_errors import CannotReadError, CannotWriteError
+from study.store.disk.file_errors import CannotReadError, convert_write_errors
 from study.store.disk.privacy import make_folder, write_private
 
 FileContents = dict[str, bytes]
@@ -34,9 +34,7 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write the files below the folder, new ones with mode 600, replacing the content of existing ones; missing folders
     are created. The keys are not checked (`..` leaves the folder): they must come from a trusted sender. Raises
     CannotWriteError where a file cannot be written; those before it remain."""
-    try:
+    with convert_write_errors(folder):
         for name, content in files.items():
             make_folder((folder / name).parent)
             write_private(folder / name, content)
-    except OSError as problem:
-        raise CannotWriteError(folder, problem) from problem

@@ -33,9 +33,7 @@ def read_text_attribute(owner: Any, name: str, default: str | None = None) -> st
 def read_texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
     """Read one text or a list of texts, as a tuple. Raises AttributeProblemError if it is missing and has no default,
     is empty or too large, or is not text in UTF-8."""
-    if name not in owner.attrs:
-        if default is None:
-            raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
+    if default is not None and name not in owner.attrs:
         return default
     stored_value = _read_value(owner, name)
     values = np.atleast_1d(stored_value).ravel().tolist()
@@ -56,9 +54,7 @@ def read_numbers_attribute(
 ) -> tuple[float, ...]:
     """Read `count` numbers as floats. Raises AttributeProblemError if they are missing and have no default, or the
     attribute holds another number of values or another type."""
-    if name not in owner.attrs:
-        if default is None:
-            raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
+    if default is not None and name not in owner.attrs:
         return default
     stored_value = _read_value(owner, name)
     values = np.atleast_1d(stored_value).ravel()
@@ -97,7 +93,9 @@ def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
 
 
 def _read_value(owner: Any, name: str) -> Any:
-    """Read the value as h5py gives it, unless it is empty or too large; that raises AttributeProblemError."""
+    """Read the value as h5py gives it. Raises AttributeProblemError where it is missing, empty or too large."""
+    if name not in owner.attrs:
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
     shape = owner.attrs.get_id(name).shape
     if shape is None or math.prod(shape) > _MAX_ENTRIES:
         raise AttributeProblemError(

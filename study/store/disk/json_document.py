@@ -8,9 +8,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from equalizer.signals.listed_problems import ListedProblemsError
+from pydantic import TypeAdapter, ValidationError
+
+from equalizer.signals.listed_problems import format_validation_problems
 from study.regular_file import MAX_DOCUMENT_BYTES
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError, convert_problems
 from study.store.disk.provenance import Provenance
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
@@ -68,10 +70,20 @@ def read_content(
     content. kind: name of such files in messages. Raises as `read_json`, and UnusableFileError for invalid content."""
     document = read_json(path, format_name, version)
     document.pop("provenance", None)
-    try:
+    with convert_problems(path, kind):
         return parse(document)
-    except ListedProblemsError as error:
-        raise UnusableFileError(path, kind, error.problems) from error
+
+
+def read_record(path: Path, format_name: str, version: int, kind: str, validator: TypeAdapter[Content]) -> Content:
+    """Read a document whose content is a dataclass, by its validator. Keys of no field, such as the provenance, are
+    ignored. kind: name of such files in messages. Raises as `read_json`, and UnusableFileError for a field that is
+    missing or has a wrong type."""
+    document = read_json(path, format_name, version)
+    try:
+        # As JSON, because lists become tuples there even where no other type is converted.
+        return validator.validate_json(json.dumps(document), strict=True)
+    except ValidationError as error:
+        raise UnusableFileError(path, kind, format_validation_problems(error.errors())) from error
 
 
 def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from study.errors import StudyError
 from study.store.disk.atomic_write import sync_entry, sync_folder
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import CannotWriteError, convert_write_errors
 from study.store.disk.privacy import make_folder
 
 
@@ -21,7 +21,7 @@ def require_new_folder(folder: Path) -> None:
     """Check that results can be written to `folder`. Raises StudyError where it exists and is not an empty folder, or
     where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable, the folder is a
     link that leads in a circle, or the folder or its parent cannot be examined."""
-    try:
+    with convert_write_errors(folder):
         if _follow_links(folder).is_symlink():
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         parent = _follow_links(folder).parent
@@ -30,8 +30,6 @@ def require_new_folder(folder: Path) -> None:
             folder.exists(),
             parent.is_dir(),
         )
-    except OSError as problem:
-        raise CannotWriteError(folder, problem) from problem
     if has_parent and not os.access(parent, os.W_OK):
         raise CannotWriteError(folder, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
     if is_empty:
@@ -62,18 +60,14 @@ def create_new_folder(folder: Path) -> Iterator[Path]:
     require_new_folder(folder)
     folder = _follow_links(folder)
     temporary_folder = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
-    try:
+    with convert_write_errors(folder):
         make_folder(temporary_folder)
-    except OSError as problem:
-        raise CannotWriteError(folder, problem) from problem
     try:
         yield temporary_folder
         require_new_folder(folder)
-        try:
+        with convert_write_errors(folder):
             sync_folder(temporary_folder)
             temporary_folder.rename(folder)
-        except OSError as problem:
-            raise CannotWriteError(folder, problem) from problem
         sync_entry(folder)
     finally:
         shutil.rmtree(temporary_folder, ignore_errors=True)

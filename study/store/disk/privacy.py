@@ -7,6 +7,7 @@ file elsewhere gets the usual rights (666 minus umask) where its folder is open 
 import contextlib
 import errno
 import os
+import shlex
 import stat
 from pathlib import Path
 
@@ -92,7 +93,8 @@ def format_privacy_warning(folder: Path, reason: str = "") -> str:
         return ""
     mode = stat.S_IMODE(folder.stat().st_mode)
     text = f"Other accounts of this computer have rights to {folder} (mode {mode:03o})."
-    return f"{text}{reason and f' A session leaves them: {reason}.'} Remove these rights: chmod 700 {folder}"
+    command = shlex.join(("chmod", "700", str(folder)))
+    return f"{text}{reason and f' A session leaves them: {reason}.'} Remove these rights: {command}"
 
 
 def format_data_folder_warning(data_folder: Path) -> str:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from equalizer.linkage.calibration import CalibrationError, LinkageCalibration
+from equalizer.linkage.calibration import LinkageCalibration
 from equalizer.signals.signal import FloatArray
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError, convert_problems
 from study.store.disk.hdf5_attributes import read_numbers_attribute, read_provenance_attribute, read_text_attribute
 from study.store.disk.hdf5_file import ProblemCollector, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.layout import Entry
@@ -63,10 +63,8 @@ def read_calibration(path: Path) -> LinkageCalibration:
         fields = _read_fields(file, problems)
     if problems.messages:
         raise UnusableFileError(path, KIND, tuple(problems.messages))
-    try:
+    with convert_problems(path, KIND):
         return LinkageCalibration(**fields)
-    except CalibrationError as error:
-        raise UnusableFileError(path, KIND, error.problems) from error
 
 
 def write_calibration(path: Path, calibration: LinkageCalibration) -> None:

@@ -4,16 +4,13 @@ A daily check compares the friction, gain, response and noise in a recording of 
 recording (the baseline).
 """
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from equalizer.signals.listed_problems import format_validation_problems
-from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.json_document import read_json, write_json
+from study.store.disk.json_document import read_record, write_json
 from study.store.disk.provenance import gather_provenance
 
 FORMAT, VERSION = "hapteq-daily-check", 1
@@ -53,10 +50,4 @@ def write_daily_check(path: Path, check: DailyCheck) -> None:
 def read_daily_check(path: Path) -> DailyCheck:
     """Read the result of a daily check. Raises CannotReadError where the file cannot be read, UnusableFileError where
     it is of another format or version, lacks a field, or a field has a wrong type."""
-    document = read_json(path, FORMAT, VERSION)  # unknown keys, such as the provenance, are ignored
-    try:
-        # As JSON, because lists become tuples there even where no other type is converted.
-        return TypeAdapter(DailyCheck).validate_json(json.dumps(document), strict=True)
-    except ValidationError as error:
-        problems = format_validation_problems(error.errors())
-        raise UnusableFileError(path, "daily check", problems) from error
+    return read_record(path, FORMAT, VERSION, "daily check", TypeAdapter(DailyCheck))

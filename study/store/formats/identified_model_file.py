@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from equalizer.plant.identified_model import IdentifiedModel, IdentifiedModelError
+from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.signal import FloatArray
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError, convert_problems
 from study.store.disk.hdf5_attributes import (
     collapse_single_text,
     read_numbers_attribute,
@@ -80,10 +80,8 @@ def read_identified_model(path: Path | str) -> IdentifiedModel:
         model_fields = _read_model_fields(file, problems)
     if problems.messages:
         raise UnusableFileError(path, KIND, tuple(problems.messages))
-    try:
+    with convert_problems(path, KIND):
         return IdentifiedModel(**model_fields)
-    except IdentifiedModelError as error:
-        raise UnusableFileError(path, KIND, error.problems) from error
 
 
 def confirm_identified_model(path: Path) -> bool:

@@ -5,9 +5,9 @@ This module handles the file and describes its keys; `equalizer.plant.mechanical
 
 from pathlib import Path
 
-from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.plant.mechanical_model_toml import format_mechanical_model, parse_mechanical_model
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.file_errors import convert_problems
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import read_toml_text, write_text
 
@@ -59,10 +59,8 @@ def read_mechanical_model(path: Path | str) -> MechanicalModel:
     """Read a model. Raises CannotReadError where the file cannot be read as text, and UnusableFileError with the
     problems of its content."""
     path = Path(path)
-    try:
+    with convert_problems(path, KIND):
         return parse_mechanical_model(read_toml_text(path, KIND))
-    except MechanicalModelError as error:
-        raise UnusableFileError(path, KIND, error.problems) from error
 
 
 def write_mechanical_model(path: Path | str, model: MechanicalModel, *, overwrite: bool = False) -> None:

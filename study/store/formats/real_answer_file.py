@@ -11,11 +11,10 @@ from analysis.diagnosis.real_answer.real_answer import (
     FORMAT,
     VERSION,
     RealAnswer,
-    RealAnswerError,
     real_answer_from_json,
     real_answer_to_json,
 )
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.file_errors import convert_problems
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
 
@@ -30,10 +29,8 @@ def read_answer_and_provenance(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
     be read, UnusableFileError where it has another format or version, or invalid content."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     provenance = document.pop("provenance", None)
-    try:
+    with convert_problems(path, "answer to a real recording"):
         return real_answer_from_json(document), provenance if isinstance(provenance, dict) else {}
-    except RealAnswerError as error:
-        raise UnusableFileError(path, "answer to a real recording", error.problems) from error
 
 
 def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:

@@ -7,11 +7,10 @@ device for which the forces were learned.
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from equalizer.signals.listed_problems import format_validation_problems
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.json_document import read_json, write_json
+from study.store.disk.json_document import read_record, write_json
 from study.store.disk.provenance import Provenance
 
 FORMAT, VERSION = "hapteq-repeats", 1
@@ -68,13 +67,7 @@ def get_repeats_path(forces_path: Path) -> Path:
 def read_repeats(path: Path) -> Repeats:
     """Read the document, without its provenance. Raises CannotReadError where the file cannot be read,
     UnusableFileError where it has another format or version, a wrong type, or a `kept` that is no index of `errors`."""
-    document = read_json(path, FORMAT, VERSION)
-    document.pop("provenance", None)
-    try:
-        repeats = REPEATS_VALIDATOR.validate_python(document)
-    except ValidationError as error:
-        problems = format_validation_problems(error.errors())
-        raise UnusableFileError(path, KIND, problems) from error
+    repeats = read_record(path, FORMAT, VERSION, KIND, REPEATS_VALIDATOR)
     if not 0 <= repeats.kept < len(repeats.errors):
         raise UnusableFileError(path, KIND, (f"kept is {repeats.kept}, but there are {len(repeats.errors)} plays",))
     return repeats

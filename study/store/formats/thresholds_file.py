@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from analysis.psychophysics.thresholds import Threshold
-from study.store.disk.csv_rows import CsvError, format_csv_table, list_columns, parse_csv_table
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.csv_rows import format_csv_table, list_columns, parse_csv_table
+from study.store.disk.file_errors import convert_problems
 from study.store.disk.text_file import read_text, write_text
 
 THRESHOLDS_NAME = "thresholds.csv"
@@ -31,7 +31,5 @@ def write_thresholds(path: Path, thresholds: Iterable[Threshold]) -> None:
 def read_thresholds(path: Path) -> tuple[Threshold, ...]:
     """Read the table. Raises CannotReadError where the file cannot be read, UnusableFileError where it is not a table
     of thresholds."""
-    try:
+    with convert_problems(path, KIND):
         return parse_csv_table(read_text(path), Threshold)
-    except CsvError as error:
-        raise UnusableFileError(path, KIND, error.problems) from error

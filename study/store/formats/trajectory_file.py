@@ -5,18 +5,16 @@
 
 from pathlib import Path
 
-from equalizer.tracking.feedforward.trajectory import TableError, Trajectory, format_trajectory_csv, parse_trajectory
-from study.store.disk.file_errors import UnusableFileError
+from equalizer.tracking.feedforward.trajectory import Trajectory, format_trajectory_csv, parse_trajectory
+from study.store.disk.file_errors import convert_problems
 from study.store.disk.text_file import read_text, write_text
 
 
 def read_trajectory(path: Path) -> Trajectory:
     """Read a table; its header determines whether it holds accelerations or forces (`TABLE_KINDS`). Raises
     CannotReadError where the file cannot be read as text, UnusableFileError where the text is no such table."""
-    try:
+    with convert_problems(path, "table of accelerations or forces"):
         return parse_trajectory(read_text(path))
-    except TableError as error:
-        raise UnusableFileError(path, "table of accelerations or forces", error.problems) from error
 
 
 def write_trajectory(path: Path, trajectory: Trajectory) -> None:

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import CsvError, format_csv_table, list_columns, parse_csv_table
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.csv_rows import format_csv_table, list_columns, parse_csv_table
+from study.store.disk.file_errors import UnusableFileError, convert_problems
 from study.store.disk.text_file import read_text, write_text
 
 TRIALS_NAME = "trials.csv"
@@ -30,10 +30,8 @@ def read_trials(path: Path | str, kind: str = KIND) -> tuple[Trial, ...]:
     """Read the table. kind: name of such files in messages. Raises CannotReadError where the file cannot be read, and
     UnusableFileError where it is not a table of trials or where `find_trial_problems` finds a problem."""
     path = Path(path)
-    try:
+    with convert_problems(path, kind):
         trials = parse_csv_table(read_text(path), Trial)
-    except CsvError as error:
-        raise UnusableFileError(path, kind, error.problems) from error
     if problems := find_trial_problems(trials):
         raise UnusableFileError(path, kind, problems)
     return trials

@@ -7,6 +7,7 @@ tombstone (a small file that states the withdrawal) in place of the data, so tha
 import contextlib
 import os
 import re
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,7 +87,8 @@ class SessionWithdrawnError(StudyError):
         super().__init__(
             "This session was withdrawn",
             f"The participant of {folder.name} withdrew; {folder.erasure_status}.",
-            f"Nothing can be done with it; hapteq validate {folder.path} says whether anything remains.",
+            f"Nothing can be done with it; {shlex.join(('hapteq', 'validate', str(folder.path)))} says whether "
+            "anything remains.",
         )
 
 
@@ -101,6 +103,11 @@ def require_consent(folders: Iterable[SessionFolder]) -> None:
                 "Run the same command again: it leaves this session out.",
                 saved="Nothing of this run was kept.",
             )
+
+
+def list_linked_sessions(folders: Iterable[SessionFolder]) -> tuple[Path, ...]:
+    """List the sessions that are symbolic links: their participants withdraw in the data folder to which they lead."""
+    return tuple(folder.path for folder in folders if folder.path.is_symlink())
 
 
 def check_subject(code: str) -> str:

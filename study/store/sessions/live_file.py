@@ -7,13 +7,14 @@ The file is replaced atomically, so that a reader never sees an incomplete one. 
 import json
 import math
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, get_args
+
+from pydantic import TypeAdapter
 
 from study.regular_file import read_regular
 from study.session.facts.fact_types import check_utc_time
-from study.session.watching.live_state import Activity, LiveState
+from study.session.watching.live_state import LiveState
 from study.store.disk.privacy import write_private
 from study.store.disk.strict_json import load_json
 
@@ -22,7 +23,9 @@ LIVE_NAME = "live.json"
 LIVE_FORMAT = "hapteq-live"
 LIVE_VERSION = 1
 
-_ACTIVITIES = get_args(Activity)
+_KEYS = {"format", "version", *(field.name for field in fields(LiveState))}
+"""Keys of the document; files of older versions lack some, which then have their defaults."""
+_VALIDATOR = TypeAdapter(LiveState)
 _MAX_FILE_BYTES = 1 << 16
 """Largest file that is read (bytes). Chosen, far above the size of a live state."""
 
@@ -31,7 +34,10 @@ def write_live(folder: Path, live_state: LiveState) -> None:
     """Write the live state into the session's folder, replacing the previous file; NaN and infinity become null. An
     OSError is ignored: a session must not end because its state cannot be displayed. Call only with the session's lock
     held (`session_lock`), because the name of the temporary file is fixed."""
-    values = {name: _replace_nonfinite(value) for name, value in asdict(live_state).items()}
+    values = {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in asdict(live_state).items()
+    }
     text = json.dumps({"format": LIVE_FORMAT, "version": LIVE_VERSION, **values}, allow_nan=False)
     temporary_path = folder / f".{LIVE_NAME}.part"
     # No fsync: only the current state matters, and a slow disk would delay the session.
@@ -51,51 +57,13 @@ def read_live(folder: Path) -> LiveState | None:
     `_MAX_FILE_BYTES`, of another format or version, or has an invalid field."""
     try:
         document = load_json(read_regular(folder / LIVE_NAME, _MAX_FILE_BYTES))
+        if not isinstance(document, dict) or not document.keys() <= _KEYS:
+            return None
+        if (document.pop("format", None), document.pop("version", None)) != (LIVE_FORMAT, LIVE_VERSION):
+            return None
+        live_state = _VALIDATOR.validate_json(json.dumps(document), strict=True)
+        check_utc_time(live_state.utc)
+        check_utc_time(live_state.since_utc)
     except (OSError, ValueError):
         return None
-    if not isinstance(document, dict):
-        return None
-    if (document.pop("format", None), document.pop("version", None)) != (LIVE_FORMAT, LIVE_VERSION):
-        return None
-    return LiveState(**document) if _has_valid_fields(document) else None
-
-
-def _has_valid_fields(values: dict[str, Any]) -> bool:
-    """Whether the values have the fields of `LiveState` and no others, with valid types, times and activity."""
-    # Files of older versions lack these two fields, which then have their defaults.
-    values = {"monotonic_s": None, "telemetry": "", **values}
-    number_types = (int, float)
-    types_by_field: dict[str, tuple[type, ...]] = {
-        "utc": (str,),
-        "activity": (str,),
-        "since_utc": (str,),
-        "fault": (str,),
-        "offset_mm": (*number_types, type(None)),
-        "handle_ready": (bool,),
-        "acceleration_mps2": (*number_types, type(None)),
-        "sensor_clipped": (bool,),
-        "missed_ticks": (int,),
-        "monotonic_s": (*number_types, type(None)),
-        "telemetry": (str,),
-    }
-    return (
-        values.keys() == types_by_field.keys()
-        and all(isinstance(value, types_by_field[name]) for name, value in values.items())
-        # JSON distinguishes true from 1, but isinstance(True, int) holds in Python.
-        and all(types_by_field[name] == (bool,) or not isinstance(value, bool) for name, value in values.items())
-        and values["activity"] in _ACTIVITIES
-        and all(_is_utc_time(values[name]) for name in ("utc", "since_utc"))
-    )
-
-
-def _is_utc_time(text: str) -> bool:
-    """Whether the text is a valid time with UTC offset (`check_utc_time`)."""
-    try:
-        return bool(check_utc_time(text))
-    except ValueError:
-        return False
-
-
-def _replace_nonfinite(value: Any) -> Any:
-    """Replace NaN and infinity, which JSON does not have, by None."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return live_state

@@ -7,21 +7,19 @@ no key: the replacement of both log and seal is not detected.
 """
 
 import hashlib
-import json
 import re
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter
 
-from equalizer.signals.listed_problems import format_validation_problems
 from study.errors import StudyError
 from study.session.facts.fact_types import Count, Sha256
 from study.session.facts.log_chain import CHECKSUM_DIGITS, Chain, ChainBrokenError, verify_checksum
-from study.store.disk.file_errors import AlreadyExistsError, UnusableFileError
-from study.store.disk.json_document import read_json, write_json
+from study.store.disk.file_errors import AlreadyExistsError
+from study.store.disk.json_document import read_record, write_json
 from study.store.sessions.event_log import LOG_NAME, LogContents, read_log
 
 SEAL_NAME = "seal.json"
@@ -88,11 +86,7 @@ def seal_log(log_path: Path) -> None:
 def read_seal(path: Path) -> Seal:
     """Read and validate a seal. Raises CannotReadError where the file cannot be read, UnusableFileError where its
     format, version or a field is invalid."""
-    document = read_json(path, SEAL_FORMAT, SEAL_VERSION)
-    try:
-        return SEAL_VALIDATOR.validate_json(json.dumps(document), strict=True)
-    except ValidationError as error:
-        raise UnusableFileError(path, "seal of a session log", format_validation_problems(error.errors())) from error
+    return read_record(path, SEAL_FORMAT, SEAL_VERSION, "seal of a session log", SEAL_VALIDATOR)
 
 
 def check_seals(folder: Path, log_contents: LogContents) -> int:

@@ -38,6 +38,9 @@ _NOTE_PREFIX = "note-"
 """Beginning of the name of a note: notes that are not logged yet are kept from one sitting to the next."""
 _TAKEN_PREFIX = ".taken-"
 """Put before the name of a note that was taken and is not logged yet, so that it survives the end of the program."""
+_UNUSABLE_PREFIX = ".unusable-"
+"""Put before the name of an invalid request, which is set aside for later inspection, such as a note of another
+version."""
 _SOURCES = get_args(RequestSource)
 """Origins of requests (`who`) that a reader accepts."""
 _MAX_REQUEST_BYTES = 1 << 16
@@ -102,15 +105,15 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """Remove all files but notes, such as old requests to stop or pause and unusable requests, at the start of a
-        sitting. Notes are kept for the log; those that were taken, but not logged because the program ended, become
-        unread again. Never raises."""
+        """Remove all files but notes, such as old requests to stop or pause, at the start of a sitting. Notes are kept
+        for the log, invalid ones for inspection; those that were taken, but not logged because the program ended,
+        become unread again. Never raises."""
         with suppress(OSError):
             self._make_folder()
         for name in self._list_names():
             if name.startswith(_TAKEN_PREFIX + _NOTE_PREFIX):
                 self._rename(name, name.removeprefix(_TAKEN_PREFIX))
-            elif not name.startswith(_NOTE_PREFIX):
+            elif not name.startswith((_NOTE_PREFIX, _UNUSABLE_PREFIX + _NOTE_PREFIX)):
                 self._remove(name)
 
     def forget_logged(self, note: NoteAsked) -> None:
@@ -153,7 +156,7 @@ class RequestInbox:
             request = StopAsked("experimenter")
         match request:
             case None:
-                self._rename(name, f".unusable-{name}")  # set aside, for later inspection
+                self._rename(name, _UNUSABLE_PREFIX + name)
             case NoteAsked():
                 self._rename(name, _TAKEN_PREFIX + name)
             case _:

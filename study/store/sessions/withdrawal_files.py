@@ -5,12 +5,17 @@ interrupted withdrawal can be completed. While it exists, no session of the part
 tombstone, `withdrawn.json`, replaces the contents of a session folder and holds no measured value.
 """
 
+import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from study.errors import StudyError
+from study.session.facts.fact_types import Count
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.real_folder import is_real_file, is_real_folder, open_folder
 from study.store.sessions.archive import SessionFolder, holds_session, is_session_name, locate_withdrawal_record
@@ -30,8 +35,11 @@ class SessionParticipant:
     protocol: str
     simulated: bool
     """Whether a simulated participant gave the answers."""
-    number: int | None
+    number: Count | None
     """Place in the counterbalanced order, as a participant number from 0; None if none was assigned."""
+
+
+_PARTICIPANT_VALIDATOR = TypeAdapter(SessionParticipant)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,26 +127,21 @@ def describe_unfinished_withdrawal(folder: SessionFolder) -> str:
     if not remaining_entries and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""
     remaining_text = f"Still there: {', '.join(remaining_entries)}. " if remaining_entries else ""
-    return f"{remaining_text}Continue with: hapteq withdraw {folder.name} --data {folder.path.parent}"
+    return f"{remaining_text}Continue with: {format_withdraw_command(folder)}"
+
+
+def format_withdraw_command(folder: SessionFolder) -> str:
+    """Format the command that erases the data of the session's participant, or continues to; the path is quoted for a
+    POSIX shell where needed."""
+    return shlex.join(("hapteq", "withdraw", folder.name, "--data", str(folder.path.parent)))
 
 
 def _parse_participant(document: Any) -> SessionParticipant | None:
     """Parse a participant from a JSON value; None if it is missing, or has other fields or types."""
     try:
-        participant = SessionParticipant(**document) if document else None
-    except TypeError:
+        return _PARTICIPANT_VALIDATOR.validate_json(json.dumps(asdict(SessionParticipant(**document))), strict=True)
+    except (TypeError, ValueError):
         return None
-    return participant if participant is not None and _has_valid_types(asdict(participant)) else None
-
-
-def _has_valid_types(values: Mapping[str, Any]) -> bool:
-    """Whether the values have the types of the fields of `SessionParticipant`, and the number is not negative."""
-    number = values["number"]
-    # A bool is an int for Python, but no participant number.
-    is_number = isinstance(number, int) and not isinstance(number, bool) and number >= 0
-    return (
-        isinstance(values["protocol"], str) and isinstance(values["simulated"], bool) and (number is None or is_number)
-    )
 
 
 def _is_erasable_path(data_folder: Path, name: str) -> bool:

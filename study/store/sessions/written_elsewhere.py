@@ -21,9 +21,9 @@ LINE_BREAK_REPLACEMENT = "\0"
 
 
 def note_written_folder(source: Path, folder: Path, even_if_searched: bool = False) -> None:
-    """Add the absolute path of `folder` to the list, unless it is listed already or a withdrawal would search it: the
-    data folder, a folder directly in it, or any folder within a session. Errors of writing the list are ignored; a
-    list that cannot be read is left as it is, so that its folders are not lost.
+    """Add the absolute path of `folder` to the list, unless it is listed already or a withdrawal would search or erase
+    it: the data folder, a folder directly in it, or any folder within the session `source`. Errors of writing the list
+    are ignored; a list that cannot be read is left as it is, so that its folders are not lost.
 
     source: the data folder, or a session folder in it. even_if_searched: add `folder` wherever it is, for content that
     a withdrawal does not recognise.
@@ -38,7 +38,7 @@ def note_written_folder(source: Path, folder: Path, even_if_searched: bool = Fal
     is_searched = (
         not even_if_searched
         and relative_parts is not None
-        and (len(relative_parts) < 2 or holds_session(data_folder / relative_parts[0]))
+        and (len(relative_parts) < 2 or data_folder / relative_parts[0] == source)
     )
     if not is_searched and folder not in noted_folders:
         with suppress(OSError):

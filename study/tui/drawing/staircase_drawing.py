@@ -14,6 +14,15 @@ RIGHT_MARK, WRONG_MARK, PEAK_MARK, VALLEY_MARK = "○", "×", "▼", "▲"
 """Marks of a right and a wrong answer, and of an upper and a lower reversal."""
 LEGEND = f"{RIGHT_MARK} right  {WRONG_MARK} wrong  {PEAK_MARK} peak  {VALLEY_MARK} valley  ┄ cap  ··· threshold"
 """Meaning of the marks, in one line."""
+MARK_STYLES = {
+    RIGHT_MARK: "$text-success",
+    WRONG_MARK: "bold $text-error",
+    PEAK_MARK: "bold",
+    VALLEY_MARK: "bold $text-error",
+}
+"""Textual style of each mark, with theme variables."""
+MUTED_STYLE = "$foreground 65%"
+"""Style of labels, legend and summary."""
 
 LABEL_COLUMNS = 8
 """Width for the labels of the level axis in characters, including the space after them."""
@@ -83,14 +92,14 @@ def _add_marks(lines: list[str], dots: list[tuple[float, float]], staircase: Sta
     cells = [list(line) for line in lines]
     marks_by_cell: dict[tuple[int, int], str] = {}
     for index, (x, y) in enumerate(dots):
-        mark = _choose_mark(staircase.correct[index], staircase.reversals[index])
+        mark = choose_mark(staircase.correct[index], staircase.reversals[index])
         cell = (min(max(round(y) // 4, 0), len(cells) - 1), round(x) // 2)
         if cell not in marks_by_cell or _MARKS_BY_PRIORITY.index(mark) >= _MARKS_BY_PRIORITY.index(marks_by_cell[cell]):
             marks_by_cell[cell] = cells[cell[0]][cell[1]] = mark
     return ["".join(row) for row in cells]
 
 
-def _choose_mark(correct: bool, reversal: bool) -> str:
+def choose_mark(correct: bool, reversal: bool) -> str:
     """Choose the mark of a trial. A reversal at a right answer is a peak, because the level falls from there; at a
     wrong answer it is a valley."""
     if reversal:

@@ -17,10 +17,10 @@ from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from typing import IO
 
-from study.errors import ExitCode
+from study.errors import DeviceError, StudyError
 from study.session.views.resume_command import format_resume_command
 from study.tui.engine.child_process import start_child
-from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, SessionReady
+from study.tui.engine.from_engine import Failed, FromEngine, SessionReady
 from study.tui.engine.to_engine import Heartbeat, ToEngine
 
 ENGINE_EXIT_TIMEOUT_S = 6.0
@@ -128,7 +128,7 @@ def _make_start_failure(problem: OSError) -> Failed:
     """Make the message for an engine process that the system refused to start."""
     explanation = f"The system refused to start the process that drives the device: {problem.strerror or problem}."
     advice = "Close other programs, or start the computer anew, and begin again."
-    return Failed(ErrorText("The device program cannot be started", explanation, "", advice, int(ExitCode.ERROR)))
+    return Failed(StudyError("The device program cannot be started", explanation, advice))
 
 
 def _read_last_line(output: IO[bytes]) -> str:
@@ -149,5 +149,5 @@ def _make_end_failure(exit_code: int, last_line: str, session: SessionReady | No
     if session is not None:
         advice += f" Then continue with: {format_resume_command(session.path, session.device)}"
     saved_text = "Every answer that was given is on disk." if session is not None else ""
-    error_text = ErrorText("The device program ended", explanation, saved_text, advice, int(ExitCode.DEVICE))
-    return Failed(error_text, session.path if session is not None else "")
+    error = DeviceError("The device program ended", explanation, advice, saved_text)
+    return Failed(error, session.path if session is not None else "")

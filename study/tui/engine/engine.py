@@ -17,8 +17,8 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from study.errors import ExitCode, StudyError
-from study.tui.engine.from_engine import ErrorText, Failed
+from study.errors import StudyError, UserInterruptError
+from study.tui.engine.from_engine import Failed
 from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import Command
 
@@ -35,7 +35,7 @@ FORCED_EXIT_S = 5.0
 """Time (s) from the loss of the screen to the forced end of this process. The device was stopped before. Chosen by
 hand."""
 
-INTERRUPTED = StudyError(
+INTERRUPTED = UserInterruptError(
     "Interrupted", "No force is on.", "Begin again, or leave.", "Every answer that was given is on disk."
 )
 """Error that is reported for a command that the user interrupted."""
@@ -63,7 +63,7 @@ class Engine:
                 self._perform(command)
             except KeyboardInterrupt:  # the interrupt came just after a command had ended
                 if not self._link.ended:
-                    self._report_failure(INTERRUPTED, ExitCode.INTERRUPTED)
+                    self._report_failure(INTERRUPTED)
 
     def _await_command(self) -> Command | None:
         """Import modules in advance, then wait for the next command; None after the end of the screen's process."""
@@ -85,14 +85,14 @@ class Engine:
             commands.perform(command)
         except KeyboardInterrupt:
             self._busy = False
-            self._report_failure(INTERRUPTED, ExitCode.INTERRUPTED)
+            self._report_failure(INTERRUPTED)
         except StudyError as error:
             self._busy = False
-            self._report_failure(error, error.exit_code)
+            self._report_failure(error)
         except Exception as exception:  # noqa: BLE001 - the screen shows it, and the device is closed
             self._busy = False
             traceback.print_exc()
-            self._report_failure(_make_bug_error(exception), ExitCode.ERROR)
+            self._report_failure(_make_bug_error(exception))
         finally:
             self._busy = False
 
@@ -104,13 +104,12 @@ class Engine:
             self._commands = EngineCommands(self._link)
         return self._commands
 
-    def _report_failure(self, error: StudyError, exit_code: ExitCode) -> None:
+    def _report_failure(self, error: StudyError) -> None:
         """Send an error to the screen, with the path of the session that can be resumed; "" without one."""
         session_folder = self._commands.session_folder if self._commands is not None else None
         # A withdrawn session cannot be resumed.
         resumable_path = str(session_folder.path) if session_folder is not None and not session_folder.withdrawn else ""
-        error_text = ErrorText(error.title, error.happened, error.saved, error.do_now, int(exit_code))
-        self._link.send(Failed(error_text, resumable_path))
+        self._link.send(Failed(error, resumable_path))
 
     def _interrupt(self) -> None:
         """Interrupt the current command; called from the reading thread. A signal of the operating system is used,

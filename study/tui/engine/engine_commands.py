@@ -9,7 +9,7 @@ import contextlib
 import itertools
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -292,9 +292,6 @@ def _choose_device(command: Resume, logged_device: DeviceFacts) -> str:
 
 def _make_results_message(analysis: WrittenAnalysis) -> Results:
     """Make the message about a written analysis, with thresholds, warnings and path of the report as JSON text too."""
-    document = {
-        "thresholds": [asdict(threshold) for threshold in analysis.thresholds],
-        "warnings": list(analysis.warnings),
-        "report": str(analysis.report),
-    }
-    return Results(analysis.table, analysis.warnings, str(analysis.report), json.dumps(document, indent=2))
+    return Results(
+        analysis.table, analysis.warnings, str(analysis.report), json.dumps(analysis.as_document(), indent=2)
+    )

@@ -10,6 +10,7 @@ from enum import Enum
 from typing import Any
 
 from protocols.wording.words import Words
+from study.errors import StudyError
 from study.session.views.archive_views import DiagnosisView, HomeView, SessionView
 from study.session.views.participant_views import HandleView
 
@@ -158,18 +159,6 @@ class SessionReady:
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorText:
-    """The texts of a `study.errors.StudyError`; the fields have the same names as there."""
-
-    title: str
-    happened: str
-    saved: str
-    do_now: str
-    exit_code: int
-    """Value of the error's `ExitCode`."""
-
-
-@dataclass(frozen=True, slots=True)
 class Results:
     """Results of a session, as printed on the command line."""
 
@@ -206,7 +195,7 @@ class Withdrawn:
 class Failed:
     """A command failed or was interrupted, a sitting ended before its session was finished, or the engine failed."""
 
-    error: ErrorText
+    error: StudyError
     path: str = ""
     """Path of the opened session, which can be resumed; empty if there is none."""
 

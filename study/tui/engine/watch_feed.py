@@ -26,17 +26,13 @@ class WatchFeed:
     def __init__(self, session_path: str) -> None:
         self._connection, self._child = start_child("study.tui.engine.watch_feed", "feed", session_path)
         self._latest: WatchView | None = None
-        self._problem = ""
+        self.problem = ""
         self._is_closing = False
         self._reader = threading.Thread(target=self._receive_views, daemon=True, name="watch-feed")
         self._reader.start()
 
     def latest(self) -> WatchView | None:
         return self._latest
-
-    @property
-    def problem(self) -> str:
-        return self._problem
 
     @property
     def child_pid(self) -> int:
@@ -63,13 +59,13 @@ class WatchFeed:
             try:
                 view_or_problem = self._connection.recv()
             except (EOFError, OSError):
-                if not self._is_closing and not self._problem:
-                    self._problem = "the program that reads the log has ended; leave, and watch again."
+                if not self._is_closing and not self.problem:
+                    self.problem = "the program that reads the log has ended; leave, and watch again."
                 return
             if isinstance(view_or_problem, WatchView):
-                self._latest, self._problem = view_or_problem, ""
+                self._latest, self.problem = view_or_problem, ""
             else:
-                self._problem = view_or_problem
+                self.problem = view_or_problem
 
 
 def feed(descriptor: int, session_path: str) -> None:

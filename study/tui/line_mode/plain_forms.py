@@ -45,7 +45,11 @@ def _confirm_changes(form: Form, answers: dict[str, str], conversation: Conversa
     while True:
         conversation.prompt(words["line_form_confirm"])
         line = conversation.read_line_or_leave()
-        if line.word in (words["line_form_confirm_letter"].casefold(), words["yes"].casefold(), BACK):
+        if (
+            line.word == BACK
+            or words.is_typed("line_form_confirm_letter", line.text)
+            or words.is_typed("yes", line.text)
+        ):
             return line.word != BACK
         conversation.discard_early_lines()
         conversation.refuse("no_answer", line)

@@ -85,7 +85,7 @@ def _confirm_withdrawal(conversation: Conversation, sign_of_life: SignOfLife) ->
     word = conversation.words["withdraw_word"]
     conversation.say_texts("withdraw_all")
     conversation.prompt(conversation.words.fill("line_withdraw", {"word": word}))
-    is_confirmed = conversation.read_line(sign_of_life).word == word.casefold()
+    is_confirmed = conversation.words.is_typed("withdraw_word", conversation.read_line(sign_of_life).text)
     if not is_confirmed:
         conversation.say_texts("nothing_erased")
     return is_confirmed

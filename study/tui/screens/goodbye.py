@@ -37,7 +37,9 @@ class GoodbyeScreen(TranslatedScreen[None]):
             elif notice.finished:
                 yield LiteralText(words["end_last_trial"], classes="strong")
             else:
-                yield LiteralText(_describe_stop(notice.reason, words), classes="strong")
+                reason = {"reason": words.translate_fact(notice.reason)}
+                stop_text = words.fill("end_stops_because", reason) if notice.reason else words["end_stops"]
+                yield LiteralText(stop_text, classes="strong")
             if notice.answers:
                 yield LiteralText(words.fill_count("saved", notice.answers), classes="gap")
             if notice.answers and not notice.finished:
@@ -48,8 +50,3 @@ class GoodbyeScreen(TranslatedScreen[None]):
 
     def action_close_page(self) -> None:
         dismiss_screen(self, None)
-
-
-def _describe_stop(reason: str, words: Words) -> str:
-    """Describe a sitting that stopped before the session was finished, with the reason if there is one."""
-    return words.fill("end_stops_because", {"reason": words.translate_fact(reason)}) if reason else words["end_stops"]

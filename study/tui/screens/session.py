@@ -21,7 +21,7 @@ from study.tui.engine.to_engine import Analyze, Withdraw
 from study.tui.home_messages import CommandRequested, HomeRequested, ResumeRequested, WatchRequested
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.withdraw_prompt import WithdrawPrompt
-from study.tui.session_status import STYLES, describe_session, format_status
+from study.tui.session_status import describe_session, find_status_style, format_status
 from study.tui.widgets.long_text import LongText
 from study.tui.widgets.staircase_plot import StaircasePlot
 from study.tui.widgets.text_table import TextTable
@@ -205,7 +205,7 @@ def _make_title_line(view: SessionView) -> Content:
     parts: list[Content | str | tuple[str, str]] = [
         (line.name, "bold"),
         "   ",
-        (format_status(line.standing), STYLES[line.standing]),
+        (format_status(line.standing), find_status_style(line.standing)),
         f"   {line.protocol}",
     ]
     return Content.assemble(*parts)

@@ -15,30 +15,25 @@ from study.tui.drawing.braille import Canvas
 from study.tui.drawing.staircase_drawing import (
     AXIS_MARGIN_RATIO,
     LABEL_COLUMNS,
+    MARK_STYLES,
     MAX_DOTS_PER_TRIAL,
     MIN_AXIS_RATIO,
     MIN_PLOT_COLUMNS,
     MIN_ROWS,
+    MUTED_STYLE,
     PEAK_MARK,
     RIGHT_MARK,
     VALLEY_MARK,
     WRONG_MARK,
+    choose_mark,
     format_level,
 )
 
-MUTED = "$foreground 65%"
-"""Style of labels and legend."""
 NEXT_MARK = "?"
 LEGEND = f"{RIGHT_MARK} right {WRONG_MARK} wrong {PEAK_MARK}{VALLEY_MARK} reversal {NEXT_MARK}next ┄cap"
 """Meaning of the marks, on a single line."""
 
-_MARK_STYLES = {
-    RIGHT_MARK: "$text-success",
-    WRONG_MARK: "bold $text-error",
-    PEAK_MARK: "bold",
-    VALLEY_MARK: "bold $text-error",
-    NEXT_MARK: "bold",
-}
+_MARK_STYLES = {**MARK_STYLES, NEXT_MARK: "bold"}
 _MARK_PRIORITY = {WRONG_MARK: 1, RIGHT_MARK: 0, PEAK_MARK: 2, VALLEY_MARK: 2, NEXT_MARK: 3}
 """Priority of each mark: if several marks share a character cell, that with the highest number is drawn."""
 
@@ -89,7 +84,9 @@ def draw_level_history(
     for start, end in itertools.pairwise(points_in_dots):
         canvas.draw_line(start, end)
     marks_by_cell: dict[tuple[int, int], str] = {}
-    for (x, y), mark in zip(points_in_dots, [*map(_choose_mark, points), NEXT_MARK], strict=False):
+    for (x, y), mark in zip(
+        points_in_dots, [*(choose_mark(point.correct, point.reversal) for point in points), NEXT_MARK], strict=False
+    ):
         cell = (round(y) // 4, round(x) // 2)  # a cell has 2 x 4 dots
         if cell not in marks_by_cell or _MARK_PRIORITY[mark] >= _MARK_PRIORITY[marks_by_cell[cell]]:
             marks_by_cell[cell] = mark
@@ -99,22 +96,14 @@ def draw_level_history(
     lines = [
         _style_row(row, text, marks_by_cell, level_labels.get(row)) for row, text in enumerate(canvas.render_lines())
     ]
-    legend = Content.styled(f"{'':{LABEL_COLUMNS}}{LEGEND}"[: size[0]], MUTED)
+    legend = Content.styled(f"{'':{LABEL_COLUMNS}}{LEGEND}"[: size[0]], MUTED_STYLE)
     return Content("\n").join([*lines, legend])
-
-
-def _choose_mark(point: StaircasePoint) -> str:
-    """Choose the mark of a trial. A reversal by a right answer is a peak of the staircase, by a wrong answer a
-    valley."""
-    if point.reversal:
-        return PEAK_MARK if point.correct else VALLEY_MARK
-    return RIGHT_MARK if point.correct else WRONG_MARK
 
 
 def _style_row(row: int, text: str, marks: dict[tuple[int, int], str], label_n: float | None) -> Content:
     """Convert a row of characters to styled text, with its level label (N; none for None) before it and marks in place
     of their cells."""
-    parts: list[Content | str | tuple[str, str]] = [(f"{format_level(label_n):>{LABEL_COLUMNS - 1}} ", MUTED)]
+    parts: list[Content | str | tuple[str, str]] = [(f"{format_level(label_n):>{LABEL_COLUMNS - 1}} ", MUTED_STYLE)]
     for column, character in enumerate(text):
         mark = marks.get((row, column))
         parts.append(character if mark is None else (mark, _MARK_STYLES[mark]))

@@ -61,7 +61,7 @@ def format_view(view: WatchView) -> list[str]:
     """Format the whole view: a labelled line for each of its parts, with the three latest trials and notes, latest
     first."""
     lines = [
-        f"{STATUS_SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {describe_activity(view)}",
+        f"{STATUS_SYMBOLS[view.standing][0]} {view.standing.upper()} {view.session}: {describe_activity(view)}",
         f"Protocol   {view.protocol}; {view.answers} answers",
         f"Staircase  {format_staircase_title(view)}",
         f"Time       {describe_elapsed_time(view.exposure)} of this sitting",

@@ -11,6 +11,7 @@ from textual.content import Content
 
 from study.session.watching.watch_view import Alarm, ClosedTrial, RunStatus, WatchedRun, WatchView
 from study.tui.watch.watch_words import (
+    MUTED,
     NOT_MEASURED_LEGEND,
     NOT_MEASURED_MARK,
     STATUS_SYMBOLS,
@@ -32,19 +33,6 @@ from study.tui.watch.watch_words import (
 StyledText = Content | str | tuple[str, str]
 """A part of a line: text, text with its style, or content."""
 
-MUTED = "$foreground 65%"
-"""Style of headers, labels and less important text."""
-_STATUS_STYLES = {
-    "running": "bold $text-success",
-    "paused": "bold $text-warning",
-    "resting": "bold $text-warning",
-    "finished": "bold $text-success",
-    "stopped": "bold $text-error",
-    "not running": "bold $text-error",
-    "refused": MUTED,
-    "excluded": MUTED,
-}
-"""Style of each status of a session."""
 _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
 """Symbol of the state of a run, a single character."""
 _VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
@@ -55,10 +43,9 @@ BAR_LENGTH_CELLS = 6
 
 def format_status_line(view: WatchView) -> Content:
     """Format a line with the status of the session, its name, and its present activity."""
-    status_text = f"{STATUS_SYMBOLS[view.standing]} {view.standing.upper()}"
-    return Content.assemble(
-        (status_text, _STATUS_STYLES[view.standing]), "  ", (view.session, "bold"), f"  {describe_activity(view)}"
-    )
+    symbol, style = STATUS_SYMBOLS[view.standing]
+    status = (f"{symbol} {view.standing.upper()}", style)
+    return Content.assemble(status, "  ", (view.session, "bold"), f"  {describe_activity(view)}")
 
 
 def format_alarms(new_alarms: Sequence[Alarm], acknowledged_alarms: Sequence[Alarm]) -> Content:

@@ -5,17 +5,19 @@ from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import split_time_in_zone
 from study.session.watching.watch_view import ClosedTrial, Exposure, SittingStatus, WatchedRun, WatchView
 
-STATUS_SYMBOLS: dict[SittingStatus, str] = {
-    "running": "●",
-    "paused": "‖",
-    "resting": "◌",
-    "stopped": "■",
-    "finished": "✓",
-    "not running": "!",
-    "refused": "○",
-    "excluded": "○",
+MUTED = "$foreground 65%"
+"""Style of headers, labels and less important text."""
+STATUS_SYMBOLS: dict[SittingStatus, tuple[str, str]] = {
+    "running": ("●", "bold $text-success"),
+    "paused": ("‖", "bold $text-warning"),
+    "resting": ("◌", "bold $text-warning"),
+    "stopped": ("■", "bold $text-error"),
+    "finished": ("✓", "bold $text-success"),
+    "not running": ("!", "bold $text-error"),
+    "refused": ("○", MUTED),
+    "excluded": ("○", MUTED),
 }
-"""Symbol of each status of a session, a single character."""
+"""Symbol of each status of a session, a single character, and the style of symbol and status."""
 
 NOT_MEASURED_MARK = "n.m."
 """Text in place of an acceleration that was not measured, in the table of trials."""

@@ -18,16 +18,11 @@ class LongText(ScrollView, can_focus=True):
 
     DEFAULT_CSS = "LongText { background: $background; }"
 
-    def __init__(self, lines: tuple[str, ...], *, id: str | None = None) -> None:
-        super().__init__(id=id)
+    def __init__(self, lines: tuple[str, ...]) -> None:
+        super().__init__()
         self._lines = lines
         self._wrapped_lines: list[str] = []
         self._wrap_width = 0
-
-    def show(self, lines: tuple[str, ...]) -> None:
-        """Show these lines in place of the previous ones."""
-        self._lines, self._wrap_width = lines, 0
-        self._wrap_lines(self.scrollable_content_region.width)
 
     def on_resize(self) -> None:
         self._wrap_lines(self.scrollable_content_region.width)

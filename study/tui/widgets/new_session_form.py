@@ -69,9 +69,12 @@ class NewSessionForm(Vertical):
         self._home = home
         self._set_options(
             "#protocol",
-            [(_format_protocol_option(protocol.name, protocol.locked), protocol.name) for protocol in home.protocols],
+            [(f"{line.name} (locked)" if line.locked else line.name, line.name) for line in home.protocols],
         )
-        self._set_options("#device", [(_format_device_option(name), name) for name in home.devices])
+        self._set_options(
+            "#device",
+            [(f"{name} (nothing moves)" if name == SIMULATED_DEVICE else name, name) for name in home.devices],
+        )
         self._set_options("#model", [(_format_model_option(path, home), path) for path in home.models])
         suggested_code = suggest_code(tuple(session.subject for session in home.sessions if session.observer is None))
         self.query_one("#code", Input).placeholder = f"code, such as {suggested_code}"
@@ -189,16 +192,6 @@ class NewSessionForm(Vertical):
         message_line.set_class(css_class == "-problem", "-problem")
         message_line.set_class(css_class == "-notice", "-notice")
         message_line.update(f"! {text}" if css_class else text)
-
-
-def _format_protocol_option(name: str, locked: bool) -> str:
-    """Format a protocol in the list; locked: its file may not be changed any more."""
-    return f"{name} (locked)" if locked else name
-
-
-def _format_device_option(name: str) -> str:
-    """Format a device in the list; the simulated device is marked."""
-    return f"{name} (nothing moves)" if name == SIMULATED_DEVICE else name
 
 
 def _format_model_option(path: str, home: HomeView) -> str:

@@ -19,7 +19,7 @@ from study.session.views.archive_views import SessionLine
 from study.session.views.local_time import format_times_in_zone
 from study.tui.engine.to_engine import ShowSession
 from study.tui.home_messages import CommandRequested, ResumeRequested, WatchRequested
-from study.tui.session_status import STYLES, format_status
+from study.tui.session_status import find_status_style, format_status
 
 _NAME_TITLE, _STATUS_TITLE, _START_TITLE, _RUNS_TITLE, _ANSWERS_TITLE, _PROTOCOL_TITLE = (
     "Session",
@@ -173,5 +173,5 @@ class SessionTable(DataTable[Content | str]):
         has_counts = line.standing in ("finished", "unfinished", "running")
         runs_cells = (f"{line.runs_done}/{line.runs}" if has_counts else "",) if _RUNS_TITLE in self._widths else ()
         answers_cells = (f"{line.answers:>7}" if has_counts else "",) if _ANSWERS_TITLE in self._widths else ()
-        status = Content.styled(format_status(line.standing), STYLES[line.standing])
+        status = Content.styled(format_status(line.standing), find_status_style(line.standing))
         return Content(line.name), status, start_time, *runs_cells, *answers_cells, Content(protocol)

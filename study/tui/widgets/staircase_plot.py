@@ -8,22 +8,12 @@ from textual.widget import Widget
 from study.session.views.archive_views import Staircase
 from study.tui.drawing.staircase_drawing import (
     LABEL_COLUMNS,
-    PEAK_MARK,
-    RIGHT_MARK,
-    VALLEY_MARK,
-    WRONG_MARK,
+    MARK_STYLES,
+    MUTED_STYLE,
     draw_staircase,
     summarise_staircase,
 )
 
-_STYLES = {
-    RIGHT_MARK: "$text-success",
-    WRONG_MARK: "bold $text-error",
-    PEAK_MARK: "bold",
-    VALLEY_MARK: "bold $text-error",
-}
-MUTED_STYLE = "$foreground 65%"
-"""Style of labels and of the summary."""
 _TEXT_LINES = 2
 """Number of lines of title and summary, which the plot leaves free."""
 
@@ -33,8 +23,8 @@ class StaircasePlot(Widget):
 
     DEFAULT_CSS = "StaircasePlot { height: 14; }"
 
-    def __init__(self, staircase: Staircase, *, id: str | None = None) -> None:
-        super().__init__(id=id)
+    def __init__(self, staircase: Staircase) -> None:
+        super().__init__()
         self._staircase = staircase
 
     def render(self) -> Content:
@@ -53,7 +43,7 @@ def _apply_styles(line: str) -> Content:
     """Apply to a line of the plot the styles of labels and marks. Neighbouring characters of equal style form one span,
     because fewer spans are drawn faster."""
     styled_parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED_STYLE)]
-    for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=_STYLES.get):
+    for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=MARK_STYLES.get):
         text = "".join(characters)
         styled_parts.append((text, style) if style else text)
     return Content.assemble(*styled_parts)

@@ -11,7 +11,7 @@ class TextTable(Static):
 
     DEFAULT_CSS = "TextTable { width: auto; height: auto; }"
 
-    def __init__(self, rows: Rows, *, id: str | None = None) -> None:
+    def __init__(self, rows: Rows) -> None:
         """rows: rows of cells, of which the first is the header; without rows, an empty line is shown."""
         header, *body = align_rows(rows) or ("",)
-        super().__init__(Content("\n").join([Content.styled(header, "bold"), *map(Content, body)]), id=id)
+        super().__init__(Content("\n").join([Content.styled(header, "bold"), *map(Content, body)]))

@@ -71,7 +71,9 @@ def check_device(
         (DeviceFinding("Force on a hand", describe_forces(safety), fine=True),) if safety is not None else ()
     )
     findings = (
-        _check_kind(info),
+        DeviceFinding(
+            "Device", f"{info.name} ({'simulated: no handle moves' if info.simulated else 'a real device'})", fine=True
+        ),
         _check_answers(len(valid_readings)),
         *sensor_findings,
         _check_rate(info),
@@ -79,12 +81,6 @@ def check_device(
         *force_findings,
     )
     return DeviceReport(info.name, info.simulated, findings)
-
-
-def _check_kind(info: DeviceInfo) -> DeviceFinding:
-    """State the device's name and whether it is simulated; always fine."""
-    kind = "simulated: no handle moves" if info.simulated else "a real device"
-    return DeviceFinding("Device", f"{info.name} ({kind})", fine=True)
 
 
 def _check_answers(valid_count: int) -> DeviceFinding:

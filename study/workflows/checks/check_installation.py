@@ -78,7 +78,7 @@ def check_packages() -> tuple[DeviceFinding, ...]:
         *(
             check_requirement(requirement)
             for requirement in map(Requirement, package_requirements)
-            if _is_applicable(requirement)
+            if requirement.marker is None or requirement.marker.evaluate({"extra": ""})
         ),
     )
 
@@ -204,11 +204,6 @@ def check_privacy(data: Path) -> DeviceFinding:
     warning = format_privacy_warning(data)
     value_text = f"{data}: open to other accounts" if warning else f"{data}: for this account alone"
     return DeviceFinding(finding_name, value_text, not warning, warning)
-
-
-def _is_applicable(requirement: Requirement) -> bool:
-    """Whether a requirement applies on this computer, without any optional extra."""
-    return requirement.marker is None or requirement.marker.evaluate({"extra": ""})
 
 
 def _describe_colours(kind: str) -> str:

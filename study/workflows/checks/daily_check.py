@@ -31,7 +31,6 @@ from study.workflows.recording.record_device import RecordingPlan, make_recordin
 
 if TYPE_CHECKING:
     from analysis.device_change.compare_measurements import Change
-    from analysis.device_change.measure_device import NotMeasurableError
 
 CHECK_PROTOCOL_NAME = "daily_check"
 """Shipped recording protocol of the check, and of the acceptance."""
@@ -175,7 +174,9 @@ def compare_recordings(baseline: Recording, todays_recording: Recording) -> tupl
     try:
         return compare_measurements(baseline, todays_recording)
     except NotMeasurableError as error:
-        raise _make_not_comparable_error(error) from error
+        explanation = f"The recording does not show how the device responds: {error}."
+        advice = "Check accelerometer and handle, and try again."
+        raise DeviceError("The device was not compared", explanation, advice) from error
 
 
 def judge_last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
@@ -192,7 +193,8 @@ def judge_last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
 
 def _find_last_check(info: DeviceInfo) -> DeviceFinding:
     """Find the newest check of this device and describe it as a finding, fine only if it was passed today (local date)
-    and compared with the present baseline; "none yet" without a check. Unreadable files are skipped."""
+    and compared with the present baseline; "none yet" without a check. Unreadable files are skipped, and those dated on
+    a later day, by a clock that was set back since."""
     local_date = split_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)[0]
     device_option = info.name.replace(".", "")
     advice = f"With no hand on the handle: hapteq doctor --device {device_option} --daily."
@@ -201,10 +203,11 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
             check = read_daily_check(path)
         except StudyError:
             continue
-        if (check.device, check.details) != (info.name, info.details):
+        check_date = split_time_in_zone(check.utc, convert_to_machine_zone)[0]
+        if (check.device, check.details) != (info.name, info.details) or check_date > local_date:
             continue
         time_and_path = f"{format_time_in_zone(check.utc, convert_to_machine_zone)}, {path}"
-        if split_time_in_zone(check.utc, convert_to_machine_zone)[0] != local_date:
+        if check_date != local_date:
             return DeviceFinding(
                 "Daily check", f"none today; the last one was {time_and_path}", False, advice, warning=True
             )
@@ -256,12 +259,6 @@ def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recor
         explanation = f"{path} was played by another version of the protocol {protocol.name!r}."
         raise DeviceError("There is nothing to compare with", explanation, acceptance_advice)
     return baseline, baseline_sha256
-
-
-def _make_not_comparable_error(error: "NotMeasurableError") -> DeviceError:
-    """Make the error for a recording from which the device's response cannot be measured."""
-    explanation = f"The recording does not show how the device responds: {error}."
-    return DeviceError("The device was not compared", explanation, "Check accelerometer and handle, and try again.")
 
 
 def _plan_recording(device_name: str, folder_name: str) -> RecordingPlan:

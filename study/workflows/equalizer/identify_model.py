@@ -35,6 +35,7 @@ from study.workflows.equalizer.recordings_without_effects import (
     list_removable_effects,
     remove_effects,
 )
+from study.workflows.equalizer.spring_to_compensate import read_spring
 from study.workflows.output_paths import require_new_outputs
 
 SAME_PLACE_TOLERANCE_M = 0.001
@@ -201,10 +202,11 @@ def _require_same_system(recordings: Sequence[Recording], with_spring: bool) -> 
 
 def _describe_spring(feedback: object) -> str:
     """Describe stiffness and damping of the virtual spring, from a recording's `feedback`; "none" without a spring."""
-    if not isinstance(feedback, dict):
+    spring = read_spring(feedback)
+    if not spring:
         return "none"
     stiffness_n_per_m, damping_n_s_per_m = (
-        float(feedback.get(key, 0.0)) for key in ("stiffness_n_per_m", "damping_n_s_per_m")
+        float(spring.get(key, 0.0)) for key in ("stiffness_n_per_m", "damping_n_s_per_m")
     )
     return f"{stiffness_n_per_m:.3g} N/m, {damping_n_s_per_m:.3g} N s/m"
 

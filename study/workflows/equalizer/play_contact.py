@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.baselines import make_static_gain_inverse
@@ -111,9 +110,10 @@ def play_contact(
         raise _make_play_error(f"{plan.transient.name}: {error}.", "Correct what is named.") from error
     feedforward = start.basis.compute_forces(normal)
     reference = np.outer(np.pad(recording, (0, len(feedforward) - len(recording))), normal)
+    gain_inverse = make_static_gain_inverse(model, np.geomspace(*model.band_hz, GAIN_LINES))
     forces = (
         _require_cap(_fade_out(_subtract_spring_force(feedforward, reference, models), rate_hz), plan, rate_hz),
-        _require_cap(_compute_gain_forces(model, reference), plan, rate_hz),
+        _require_cap(gain_inverse.response[0, 0, 0].real * reference, plan, rate_hz),
     )
     measured = _play_both(plan, models, forces, on_progress, before_moving)
     in_band = filter_to_band(reference, rate_hz, band_hz)
@@ -160,12 +160,6 @@ def _fade_out(forces: FloatArray, rate_hz: float) -> FloatArray:
     remaining_s = np.arange(len(forces))[::-1] / rate_hz
     fade_share = np.clip(remaining_s / FADE_S, 0.0, 1.0)
     return np.asarray(forces * (0.5 - 0.5 * np.cos(np.pi * fade_share))[:, np.newaxis])
-
-
-def _compute_gain_forces(model: IdentifiedModel, reference: FloatArray) -> FloatArray:  # the comparison, (N, 3) in N
-    return np.asarray(
-        make_static_gain_inverse(model, np.geomspace(*model.band_hz, GAIN_LINES)).response[0, 0, 0].real * reference
-    )
 
 
 def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
@@ -246,17 +240,14 @@ def _write_play(play: ContactPlay, models: PlaybackModels) -> None:  # tables, f
         ):
             signal = Signal(samples, rate_hz, table_kind.quantity, table_kind.unit, table_kind.header[1:])
             write_trajectory(folder / name, Trajectory(signal))
-        write_pictures(folder, [make_contact_picture(play.normal, rate_hz, play.reference, *_list_plays(play))])
+        plays = (  # title, forces, acceleration
+            ("through the model", play.equalized.forces, play.equalized.measured),
+            ("one gain", play.single_gain.forces, play.single_gain.measured),
+        )
+        write_pictures(folder, [make_contact_picture(play.normal, rate_hz, play.reference, *plays)])
         provenance = gather_provenance(seeds={"device": play.plan.seed}).as_dict()
         document = {**summarise_contact(play), "model_sha256": models.sha256, "provenance": provenance}
         write_json(folder / "contact.json", "hapteq-contact", 1, document, overwrite=False)
-
-
-def _list_plays(play: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:  # title, forces, acceleration
-    return (
-        ("through the model", play.equalized.forces, play.equalized.measured),
-        ("one gain", play.single_gain.forces, play.single_gain.measured),
-    )
 
 
 def summarise_contact(play: ContactPlay) -> dict[str, Any]:

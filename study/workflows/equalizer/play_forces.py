@@ -17,7 +17,7 @@ from study.errors import DeviceError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.session.views.handle_notice import BeforeMoving, format_free_handle_notice
 from study.workflows.equalizer.playback_models import PlaybackModels
-from study.workflows.equalizer.spring_to_compensate import find_spring_to_compensate
+from study.workflows.equalizer.spring_to_compensate import find_spring_to_compensate, read_spring
 
 DEFAULT_SPRING_HZ = 3.5
 """Natural frequency (Hz) of the centring spring in the shipped recording protocols, for a model that does not state
@@ -60,8 +60,7 @@ def find_acting_spring(models: PlaybackModels) -> VirtualSpring:
 def _read_recorded_spring(models: PlaybackModels) -> dict[str, Any]:
     """Read the parameters of the virtual spring under which the nearest model was recorded, from its provenance:
     stiffness_n_per_m, damping_n_s_per_m, natural_frequency_hz. Empty where it states none."""
-    feedback = models.nearest.provenance.get("feedback")
-    return feedback if isinstance(feedback, dict) else {}
+    return read_spring(models.nearest.provenance.get("feedback"))
 
 
 def make_playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettings:

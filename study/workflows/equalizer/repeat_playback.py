@@ -35,11 +35,14 @@ from study.workflows.equalizer.play_forces import (
     read_measured_acceleration,
 )
 from study.workflows.equalizer.repeat_results import RepeatPlan, RepeatResult, make_result, write_best_forces
+from study.workflows.output_paths import require_new_outputs
 
 REST_S = 2.0
 """Duration (s) without force before the first play, in which the noise of the sensor is measured (chosen)."""
 RESTART_ADVICE = "Start again; a run for the same trajectory and model can continue from forces that were written."
 """What to do after an interruption or a fault."""
+REFUSAL_TITLE = "Nothing was repeated"
+"""Title of the errors of a plan that is refused."""
 
 OnProgress = Callable[[int, float], None]
 """Called with the index of the play, from 0, and the share of it that is done, 0 to 1."""
@@ -92,20 +95,15 @@ def _check_plan(plan: RepeatPlan) -> None:
         )
     if plan.repeats < 1:
         raise make_not_repeated_error(f"{plan.repeats} repeats were requested.", "Give 1 or more to --repeat.")
-    for path in () if plan.out is None else (plan.out, get_repeats_path(plan.out)):
-        if path.exists():
-            raise make_not_repeated_error(
-                f"{path} exists already, and results are never overwritten.", "Choose another --out."
-            )
-    if plan.out is not None and not plan.out.absolute().parent.is_dir():
-        raise make_not_repeated_error(
-            f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first."
+    if plan.out is not None:
+        require_new_outputs(
+            plan.out, get_repeats_path(plan.out), title=REFUSAL_TITLE, kind="results", saved="Nothing moved."
         )
 
 
 def make_not_repeated_error(explanation: str, advice: str) -> StudyError:
     """Make the error for repeats that are refused before anything moves."""
-    return StudyError("Nothing was repeated", explanation, advice, saved="Nothing moved.")
+    return StudyError(REFUSAL_TITLE, explanation, advice, saved="Nothing moved.")
 
 
 def _play_and_correct(

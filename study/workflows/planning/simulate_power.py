@@ -24,7 +24,7 @@ from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
 from analysis.threshold_words import REVERSAL_WORDS, select_threshold_words
 from protocols.definition.staircase_rule import StaircaseRule
 from study.errors import StudyError, WrongUseError
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import convert_write_errors
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text, write_text
@@ -203,21 +203,16 @@ def _format_plan_line(plan: PowerPlan) -> str:
 
 def _create_progress_file(path: Path, plan: PowerPlan) -> None:
     """Create the folder and the file of finished studies with the plan. Raises CannotWriteError."""
-    try:
+    with convert_write_errors(path.parent):
         make_folder(path.parent)
-    except OSError as problem:
-        raise CannotWriteError(path.parent, problem) from problem
     write_text(path, _format_plan_line(plan), overwrite=True)
 
 
 def _append_json_line(path: Path, row: dict[str, object]) -> None:
     """Append a JSON object as a line. It begins with the line break, so that an incomplete line before it remains
     separate. Raises CannotWriteError."""
-    try:
-        with path.open("a", encoding="utf-8") as file:
-            file.write("\n" * (file.tell() > 0) + json.dumps(row))
-    except OSError as problem:
-        raise CannotWriteError(path, problem) from problem
+    with convert_write_errors(path), path.open("a", encoding="utf-8") as file:
+        file.write("\n" * (file.tell() > 0) + json.dumps(row))
 
 
 def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVERSAL_WORDS.noun) -> list[str]:

@@ -105,7 +105,9 @@ def record_on_device(
     except KeyboardInterrupt as interruption:
         saved = _write_complete_takes(plan, device, takes)
         if device.fault() is Fault.FORCE_LEFT:  # more important to say than the interruption
-            raise _make_force_left_error(saved) from interruption
+            raise DeviceError(
+                "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=saved
+            ) from interruption
         raise _make_interrupted_error(plan, len(takes), saved) from interruption
     except DeviceError as error:
         error.saved = _write_complete_takes(plan, device, takes)
@@ -143,11 +145,6 @@ def _make_interrupted_error(plan: RecordingPlan, take_count: int, saved: str) ->
         "Record again under another name for the whole protocol.",
         saved=saved,
     )
-
-
-def _make_force_left_error(saved: str) -> DeviceError:
-    """Make the error where the device may still exert a force. saved: sentence on the complete pieces."""
-    return DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=saved)
 
 
 def _write_complete_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake]) -> str:

@@ -21,14 +21,14 @@ from analysis.reports.study_report import render_study_report
 from analysis.wording import format_newtons
 from study.errors import StudyError, WrongUseError
 from study.local_clock import format_local_now
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import convert_write_errors
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder, restrict_to_owner
 from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
-from study.store.sessions.archive import holds_session, require_consent
+from study.store.sessions.archive import holds_session, list_linked_sessions, require_consent
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.picture_files import write_pictures
 from study.workflows.results.analysis_files import ANALYSIS_NAME, PAGE_NAME, STATISTICS_NAME, list_analysis_outputs
@@ -66,7 +66,8 @@ def analyze_data(
     )
     pictures = draw_study_pictures(analysis, ellipses)
     _create_private_folder(out_folder, data)
-    note_written_folder(data, out_folder)
+    for source in (data, *list_linked_sessions(collected_trials.sessions)):
+        note_written_folder(source, out_folder)
     try:
         _write_files(out_folder, analysis, pictures, ellipses, provenance, collected_trials)
     finally:  # also after an error: the withdrawal may have erased a folder that was being written
@@ -156,10 +157,8 @@ def _create_private_folder(folder: Path, data: Path) -> None:
     is created by `_write_files`. Raises CannotWriteError."""
     if not folder.resolve().is_relative_to(data.resolve()):
         return
-    try:
+    with convert_write_errors(folder):
         make_folder(folder, private=True)
-    except OSError as error:
-        raise CannotWriteError(folder, error) from error
     if folder.resolve() != data.resolve():
         restrict_to_owner(folder, recursive=True)
 
@@ -175,7 +174,7 @@ def _write_files(
     """Remove figures, detection.csv and report of an earlier analysis, then write all files. Raises
     CannotWriteError."""
     figure_folder = folder / "figures"
-    try:
+    with convert_write_errors(figure_folder):
         make_folder(figure_folder)
         if figure_folder.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
@@ -184,8 +183,6 @@ def _write_files(
         for outdated_path in list_analysis_outputs(folder):
             if outdated_path.parent == figure_folder or outdated_path.name == DETECTION_NAME:
                 outdated_path.unlink()
-    except OSError as error:
-        raise CannotWriteError(figure_folder, error) from error
     write_thresholds(folder / THRESHOLDS_NAME, analysis.thresholds)
     if analysis.detection:
         write_thresholds(folder / DETECTION_NAME, analysis.detection)

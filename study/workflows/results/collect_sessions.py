@@ -10,7 +10,6 @@ from pathlib import Path
 from analysis.psychophysics.population import Population, split_by_population
 from analysis.wording import conjoin
 from equalizer.plant.model_quality import NOT_STORED
-from protocols.definition.study_protocol import StudyProtocol
 from study.errors import StudyError, WrongUseError
 from study.session.facts.events import FormFilled
 from study.session.state.state import SessionState
@@ -183,22 +182,17 @@ def _choose_protocol(
             f"'{protocol_name}' was asked for; {data} holds sessions of {available_text}.",
             "Give one of these names, or the first twelve digits of its hash.",
         )
-    # A protocol with training runs only has no thresholds; it is chosen only if there is no other.
-    return max(
-        candidates,
-        key=lambda protocol_hash: (
-            _has_measured_runs(candidates[protocol_hash][0].protocol),
-            len(candidates[protocol_hash]),
-        ),
-    )
+
+    def rank(protocol_hash: str) -> tuple[bool, int]:
+        """Rank a protocol. One with training runs only has no thresholds; it is chosen only if there is no other."""
+        protocol = candidates[protocol_hash][0].protocol
+        has_thresholds = bool(protocol.stimulus.frequencies_hz or protocol.detection.frequencies_hz)
+        return has_thresholds, len(candidates[protocol_hash])
+
+    return max(candidates, key=rank)
 
 
 def _name_protocol(state: SessionState) -> str:
     """Name the protocol of a session, with the digits of its hash by which it can be chosen: a changed protocol may
     have kept its name."""
     return f"{state.protocol.name} ({state.opened.protocol_hash[:HASH_DIGITS]})"
-
-
-def _has_measured_runs(protocol: StudyProtocol) -> bool:
-    """Whether the protocol has runs that give a threshold: test or detection runs."""
-    return bool(protocol.stimulus.frequencies_hz or protocol.detection.frequencies_hz)

@@ -31,7 +31,7 @@ from study.store.formats.psych_ds import (
     write_psych_ds,
 )
 from study.store.formats.trials_mat import write_trials_mat
-from study.store.sessions.archive import SessionFolder, require_consent
+from study.store.sessions.archive import SessionFolder, list_linked_sessions, require_consent
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.results.collected_trials import CollectedTrials
 
@@ -73,7 +73,8 @@ def export_study(
     require_new_folder(out_folder)
     metadata, answers = _gather_metadata(collected), make_answer_table(collected.protocol, collected.forms, free_text)
     # Before the folder exists, so that a withdrawal names it even if the program ends here.
-    note_written_folder(data, out_folder, even_if_searched=True)
+    for source in (data, *list_linked_sessions(collected.sessions)):
+        note_written_folder(source, out_folder, even_if_searched=True)
     with create_new_folder(out_folder) as folder:
         files = WRITERS[form](
             folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), metadata, answers

@@ -97,8 +97,7 @@ def find_result_problems(folder: SessionFolder, state: SessionState) -> tuple[Re
         )
     ]
     for name, rows in _compute_tables(state).items():
-        agrees_with_log = partial(_has_same_thresholds, rows)
-        problems.append(_check_file(folder, name, agrees_with_log))
+        problems.append(_check_file(folder, name, partial(_has_same_thresholds, rows)))
     problems.append(_check_file(folder, SUMMARY_NAME, lambda path: _has_same_summary(folder, state)))
     return tuple(problem for problem in problems if problem is not None)
 

@@ -3,9 +3,9 @@
 A separate module, so that its import loads no statistics and plots.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from analysis.psychophysics.thresholds import Threshold
@@ -23,3 +23,8 @@ class WrittenAnalysis:
     """Sentences on excluded sessions, results written now, and warnings of the analysis."""
     report: Path
     """Path of the HTML report."""
+
+    def as_document(self) -> dict[str, Any]:
+        """Convert thresholds, warnings and path of the report to JSON values."""
+        thresholds = [asdict(threshold) for threshold in self.thresholds]
+        return {"thresholds": thresholds, "warnings": list(self.warnings), "report": str(self.report)}

@@ -87,15 +87,8 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     """Open the device, then a new session, and run it. Raises StudyError where device, model, sound output or session
     cannot be opened, and DeviceError where a required accelerometer is missing or the device is too slow."""
     check_model_for_protocol(plan.protocol, plan.model)
-    settings = make_device_settings(plan.protocol)
-    with (
-        _open_pulse_line(participant.clock) as pulse,
-        open_masking_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
-        contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
-    ):
-        _check_sensor(plan.protocol, device.info)
-        _check_rate(plan.protocol, device.info)
-        _check_fades(plan.protocol, device.info)
+    with _open_equipment(plan.protocol, device_name, participant.clock, plan.observer, plan.seed) as equipment:
+        pulse, sound, device = equipment
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened_session:
             return _run_sitting(opened_session, Equipment(device_name, device, equalized, pulse, sound), participant)
@@ -106,20 +99,32 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     state = fold_session(folder).state
     if state.opened.equalized is not None:
         load_equalizer()
-    settings = make_device_settings(state.protocol)
-    with (
-        _open_pulse_line(participant.clock) as pulse,
-        open_masking_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
-        contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
-    ):
-        _check_sensor(state.protocol, device.info)
-        _check_rate(state.protocol, device.info)
+    opened = state.opened
+    with _open_equipment(state.protocol, device_name, participant.clock, opened.observer, opened.seed) as equipment:
+        pulse, sound, device = equipment
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened_session:
             earlier_step_count = len(state.sitting.clock_steps)
             return _run_sitting(
                 opened_session, Equipment(device_name, device, equalized, pulse, sound), participant, earlier_step_count
             )
+
+
+@contextlib.contextmanager
+def _open_equipment(
+    protocol: StudyProtocol, device_name: str, clock: Clock, observer: str | None, seed: int
+) -> Iterator[tuple[Callable[[], Pulse | None], SoundOutput | None, Device]]:
+    """Open trigger line, masking sound and device, and check that the device suits the protocol. Raises StudyError
+    where one cannot be opened, and DeviceError for an unsuitable device."""
+    with (
+        _open_pulse_line(clock) as pulse,
+        open_masking_sound(protocol.masking, clock, observer) as sound,
+        contextlib.closing(open_device(device_name, make_device_settings(protocol), clock, seed)) as device,
+    ):
+        _check_sensor(protocol, device.info)
+        _check_rate(protocol, device.info)
+        _check_fades(protocol, device.info)
+        yield pulse, sound, device
 
 
 def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
@@ -155,7 +160,7 @@ def _check_fades(protocol: StudyProtocol, info: DeviceInfo) -> None:
             "The sitting did not begin: a fade of its protocol is too short",
             f"{shortest_fade_s:g} s (stimulus.fade_in_s or fade_out_s) is no more than half a tick of the {info.name}, "
             f"which runs at {info.sample_rate_hz:g} Hz: the force would jump.",
-            f"Set both to at least {1 / info.sample_rate_hz:g} s.",
+            f"Take a device of a higher rate, or set both to at least {1 / info.sample_rate_hz:g} s.",
             saved="Nothing moved.",
         )
 

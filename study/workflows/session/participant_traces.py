@@ -1,10 +1,10 @@
 """Search for a participant's data in a data folder, for a withdrawal (`withdraw_participant`).
 
 Proved data, which the withdrawal erases: a folder with the name of a session of the participant, whose log or tombstone
-confirms it or that an interrupted withdrawal emptied; an analysis whose tables, statistics or figures name the
+confirms it or that an interrupted withdrawal emptied; an analysis whose tables, statistics, figures or report name the
 participant; an unfinished file or folder (of an interrupted write) that belongs to such an analysis or names one of the
 participant's sessions. Doubtful data are reported and kept. Symbolic links are never followed; those with the name of
-such a session or of an analysis are reported.
+such a session or of an analysis, and those in such a session, are reported.
 """
 
 import csv
@@ -17,22 +17,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study.regular_file import open_regular, read_regular
+from study.regular_file import MAX_DOCUMENT_BYTES, open_regular, read_regular
 from study.store.disk.real_folder import is_real_file, is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 from study.store.sessions.archive import TOMBSTONE_NAME, SessionFolder, holds_session, is_session_name
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE_NAME
-from study.workflows.results.analysis_files import ANALYSIS_NAME, STATISTICS_NAME, list_analysis_outputs
+from study.workflows.results.analysis_files import ANALYSIS_NAME, PAGE_NAME, STATISTICS_NAME, list_analysis_outputs
 
 UNFINISHED_PATTERN = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
 """Name of an unfinished file or folder from an interrupted write."""
 
 MAX_SEARCHED_BYTES = 1 << 24
 """Largest text file (bytes) that is searched for a name (chosen); recordings and bitmaps are not searched."""
-MAX_FIRST_LINE_BYTES = 1 << 20
-"""Largest number of bytes of a log's first line that are read (chosen); a longer line counts as unreadable."""
 SEARCHED_EXTENSIONS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
 """Extensions of text files that are searched for names of a participant's sessions."""
 
@@ -52,12 +50,13 @@ class Traces:
 def find_traces(data: Path, subject: str, proved_names: Collection[str] = ()) -> Traces:
     """Find the data of a participant in `data`, a resolved path, without changing it. proved_names: names of session
     folders that were proved before an interrupted withdrawal erased their logs."""
-    sessions, derived, doubtful = [], [], []
+    sessions, derived, doubtful = list[str](), list[str](), list[str]()
     for path in sorted(data.iterdir()):
         if is_session_name(path.name, subject):
             # A folder that was proved earlier counts only without new content, for which nothing is proved.
             if is_session_of(path, subject) or (path.name in proved_names and _is_emptied_session(path)):
                 sessions.append(path.name)
+                doubtful += _describe_links(path)
             else:
                 doubtful.append(_describe_unproved_session(path, subject))
         elif is_real_folder(path) and UNFINISHED_PATTERN.fullmatch(path.name) is None:
@@ -106,8 +105,9 @@ def _is_emptied_session(path: Path) -> bool:
 
 
 def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
-    """Whether the analysis in this folder contains this subject, by its tables, its statistics, or the names of its
-    figures; None where neither tables nor statistics can be read and no figure names the subject."""
+    """Whether the analysis in this folder names this subject: in its tables, its statistics, the names of its figures,
+    or its report, which also lists the sessions that were left out; None where neither tables nor statistics can be
+    read and no figure names the subject."""
     table_results = [_is_subject_in_table(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
     table_results.append(_is_subject_in_statistics(folder / STATISTICS_NAME, subject))
     if any(table_results):
@@ -115,7 +115,7 @@ def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
     figure_pattern = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
     if any(figure_pattern.fullmatch(path.name) for path in list_analysis_outputs(folder)):
         return True
-    return None if all(result is None for result in table_results) else False
+    return None if all(result is None for result in table_results) else _has_session_name(folder / PAGE_NAME, subject)
 
 
 def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
@@ -125,7 +125,7 @@ def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
         return None
     try:
         with open_regular(folder.log) as file:
-            first_event = json.loads(file.readline(MAX_FIRST_LINE_BYTES))
+            first_event = json.loads(file.readline(MAX_DOCUMENT_BYTES))
     except (OSError, ValueError, RecursionError):
         return None
     return (first_event.get("session"), first_event.get("subject")) if isinstance(first_event, dict) else None
@@ -142,12 +142,25 @@ def _describe_unproved_session(path: Path, subject: str) -> str:
 
 def _describe_other_folder(path: Path, subject: str) -> Iterator[str]:
     """Describe a folder that contains a log of the subject and is not named like its session, or a diagnosis of the
-    subject, in one sentence; yields nothing for other folders."""
+    subject, and entries in it that are named like sessions of the subject, a sentence each; yields nothing for other
+    folders."""
     identity = _read_opening(SessionFolder(path))
     if identity is not None and identity[1] == subject:
         yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
     elif _has_session_name(path / "diagnosis.json", subject):
         yield f"{path.name} holds a diagnosis that names {subject}."
+    with suppress(OSError):  # a folder that cannot be looked into is reported by the search for analyses
+        nested_names = (entry.name for entry in sorted(path.iterdir()) if is_session_name(entry.name, subject))
+        yield from (f"{path.name}/{name} is named like a session of {subject}." for name in nested_names)
+
+
+def _describe_links(session: Path) -> Iterator[str]:
+    """Describe the links in a session's folder, such as to recordings that were moved to another disk, a sentence each:
+    the links are erased with the session."""
+    for path in sorted(session.rglob("*")):
+        if path.is_symlink():
+            name = path.relative_to(session.parent).as_posix()
+            yield f"{name} is a link; what it leads to was not touched: {path.readlink()}."
 
 
 def _may_hold_analysis(path: Path, subject: str) -> bool:

@@ -122,11 +122,6 @@ def make_subject_code(number: int) -> str:
     return f"S{number + 1:03d}"
 
 
-def list_subject_codes(subjects: int) -> set[str]:
-    """List the codes of the first `subjects` simulated participants."""
-    return {make_subject_code(number) for number in range(subjects)}
-
-
 def derive_subject_seed(seed: int, number: int) -> int:
     """Derive the 32-bit seed of one participant: a hash of the rehearsal's seed and the number, so that rehearsals with
     consecutive seeds have no participant in common."""
@@ -212,7 +207,7 @@ def _find_begun_session(data: Path, subject: str) -> SessionFolder | None:
 def _require_same_rehearsal(rehearsal: Rehearsal) -> None:
     """Raise StudyError where the folder holds other participants, or sessions with another model, observer, seed or
     protocol."""
-    codes = list_subject_codes(rehearsal.subjects)
+    codes = {make_subject_code(number) for number in range(rehearsal.subjects)}
     other_sessions = [
         session_folder.name
         for session_folder in list_session_folders(rehearsal.data)

@@ -5,6 +5,7 @@ its recording or from the device's counters in the log, because dropping answers
 result.
 """
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -122,7 +123,7 @@ def make_finished_error(state: SessionState, folder: SessionFolder) -> StudyErro
     return StudyError(
         "This session is finished",
         f"{folder.name} has all its runs.",
-        f"Look at its results: hapteq analyze {folder.path}",
+        f"Look at its results: hapteq analyze {shlex.quote(str(folder.path))}",
         saved=f"{format_answer_count(state.answers)} on disk.",
     )
 
@@ -242,13 +243,7 @@ def _measure_from_recording(
         missed_ticks=recording.meta.get("missed_ticks"),
         late_ticks=recording.meta.get("late_ticks"),
         latest_s=recording.meta.get("latest_s"),
-        sensor=_read_sensor_facts(recording.meta.get("sensor")),
+        sensor=TypeAdapter(SensorFacts | None).validate_python(recording.meta.get("sensor")),
         vibrated_s=counters.ticks / state.opened.device.sample_rate_hz if counters is not None else None,
         monotonic_s=clock.now_s(),
     )
-
-
-def _read_sensor_facts(stored_facts: object) -> SensorFacts | None:
-    """Validate the facts about the accelerometer from the metadata of a recording; None without them. Raises ValueError
-    (pydantic's ValidationError) for other content."""
-    return None if stored_facts is None else TypeAdapter(SensorFacts).validate_python(stored_facts)

@@ -90,15 +90,16 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
 
 def _prepare_and_run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Prepare the sitting (forms, device check), assign the participant number, start the masking noise, show the
-    instructions and perform the actions."""
+    instructions where a run is left, and perform the actions."""
     state, end_reason = prepare_sitting(state, sitting)
     if state.is_finally_ineligible:
         return SessionEnd(close_ineligible_session(state, sitting), end_reason)
     if end_reason:
         return _log_sitting_end(ActionResult(state, end_reason=end_reason), sitting)
     state = start_masking(assign_place(state, sitting), sitting)
-    sitting.supervisor.start_activity("instructions")
-    sitting.display.welcome(_make_welcome(state, sitting))
+    if not state.finished:
+        sitting.supervisor.start_activity("instructions")
+        sitting.display.welcome(_make_welcome(state, sitting))
     return _run_actions(state, sitting)
 
 

@@ -25,7 +25,13 @@ from study.store.sessions.archive import (
 )
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import SESSION_LOCK_NAME, hold_session_lock
-from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
+from study.store.sessions.withdrawal_files import (
+    WithdrawalIntent,
+    format_withdraw_command,
+    read_intent,
+    write_intent,
+    write_tombstone,
+)
 from study.store.sessions.written_elsewhere import read_written_folders
 from study.workflows.session.participant_number import read_begun_participant
 from study.workflows.session.participant_traces import UNFINISHED_PATTERN, find_traces, is_subject_in_analysis
@@ -197,7 +203,8 @@ def _add_to_plan(plan: Withdrawal, later_plan: Withdrawal) -> Withdrawal:
 
 def _lock_for_erasing(data: Path, names: Iterable[str], locks: ExitStack) -> None:
     """Lock sessions and their logs until `locks` is closed. Raises OSError unless real folders are at their paths, and
-    StudyError if a session is running, which also says whether the withdrawal has begun."""
+    StudyError if a session is running, which also says whether the withdrawal has begun, and gives its command: in a
+    sitting no command was typed."""
     for folder in (SessionFolder(data / name) for name in names):
         if not is_real_folder(folder.path):
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
@@ -209,6 +216,7 @@ def _lock_for_erasing(data: Path, names: Iterable[str], locks: ExitStack) -> Non
             if is_real_file(folder.log):
                 locks.enter_context(hold_log_lock(folder.log))
         except StudyError as error:
+            error.do_now = f"{error.do_now} Then erase with: {format_withdraw_command(folder)}"
             if is_real_file(folder.withdrawal):
                 error.saved = f"Nothing was erased now, but no session of {folder.subject} counts as data any more."
             raise
@@ -250,6 +258,6 @@ def _make_incomplete_error(data: Path, withdrawal: Withdrawal, problem: OSError)
     return StudyError(
         "Not everything could be erased",
         f"Of {withdrawal.subject}: {problem.strerror or problem}{file_text}.",
-        f"Correct this and continue with: hapteq withdraw {session_name} --data {data}",
+        f"Correct this and continue with: {format_withdraw_command(SessionFolder(data / session_name))}",
         saved="What remains is no longer used as data once erasing has begun.",
     )

@@ -16,6 +16,7 @@ from study.devices.device import Fault, PlaybackResult
 from study.session.facts.events import ProbeMeasured, ProbePlayed
 from study.session.state.probe_state import Probe
 from study.session.state.state import SessionState
+from study.session.stimulus.delivered import MAX_AMPLITUDE_MPS2
 from study.session.stimulus.probe_stimulus import make_probe_stimulus, make_reference_commands
 from study.session.views.form_views import FormKind
 from study.session.views.forms import judge_form, make_form, make_take_handle_form, make_words
@@ -204,7 +205,7 @@ def _save_and_log_measurement(
             sitting.folder, file_name, recording, _make_recording_metadata(probing.open, sitting)
         )
         mean_square = float(np.mean(np.sum(recording.response.samples**2, axis=1)))
-        rms_mps2 = math.sqrt(mean_square) if math.isfinite(mean_square) else None
+        rms_mps2 = math.sqrt(mean_square) if mean_square <= MAX_AMPLITUDE_MPS2**2 else None
     if trouble:
         sitting.display.trouble(f"A probe is not used: {trouble}.")
     event = ProbeMeasured(

@@ -3,7 +3,7 @@
 Units: levels in N, accelerations in m/s², times in s; displacement and offset in mm.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,9 @@ from study.session.stimulus.delivered import DeliveredMotion
 from study.store.disk.provenance import list_versions
 from study.store.sessions.trial_recordings import name_recording, save_trial_recording
 from study.workflows.trial.sitting import Sitting
+
+LOGGED_COUNTERS = tuple(field.name for field in fields(AnswerHealth) if field.name not in ("fault", "felt_whole"))
+"""Counters of the device that are logged with an answer, by the same names in `Health` and `AnswerHealth`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,36 +63,15 @@ def make_presented_event(due_trial: PresentTrial, sitting: Sitting) -> TrialPres
 def make_answer_health(health: Health, is_complete: bool) -> AnswerHealth:
     """Make the counters of the device that are logged with the answer. is_complete: whether the device had no fault
     until the answer."""
-    return AnswerHealth(
-        fault=health.fault.name,
-        felt_whole=is_complete,
-        ticks=health.ticks,
-        missed_ticks=health.missed_ticks,
-        stimulus_clipped=health.stimulus_clipped,
-        total_clipped=health.total_clipped,
-        slew_limited=health.slew_limited,
-        sensor_clipped=health.sensor_clipped,
-        peak_command_n=health.peak_command_n,
-        late_ticks=health.late_ticks,
-        latest_s=health.latest_s,
-    )
+    counters: dict[str, Any] = {name: getattr(health, name) for name in LOGGED_COUNTERS}
+    return AnswerHealth(fault=health.fault.name, felt_whole=is_complete, **counters)
 
 
 def restore_health(logged_health: AnswerHealth) -> Health:
     """Restore the counters of the device from the log. Those that are not logged (feedback, sensor, cause) have their
     defaults. An unknown name of a fault, as of a later version, becomes `Fault.NOT_A_NUMBER`."""
-    return Health(
-        fault=Fault.__members__.get(logged_health.fault, Fault.NOT_A_NUMBER),
-        ticks=logged_health.ticks,
-        missed_ticks=logged_health.missed_ticks,
-        stimulus_clipped=logged_health.stimulus_clipped,
-        total_clipped=logged_health.total_clipped,
-        slew_limited=logged_health.slew_limited,
-        sensor_clipped=logged_health.sensor_clipped,
-        peak_command_n=logged_health.peak_command_n,
-        late_ticks=logged_health.late_ticks or 0,
-        latest_s=logged_health.latest_s or 0.0,
-    )
+    counters: dict[str, Any] = {name: getattr(logged_health, name) or 0 for name in LOGGED_COUNTERS}
+    return Health(fault=Fault.__members__.get(logged_health.fault, Fault.NOT_A_NUMBER), **counters)
 
 
 def make_void_event(

@@ -3,6 +3,8 @@
 A request is a file in the session's folder (`RequestInbox`); the session removes it when it takes the request.
 """
 
+import shlex
+
 from study.devices.clock import Clock
 from study.errors import StudyError
 from study.session.watching.requests import NoteAsked, Request, StopAsked
@@ -28,7 +30,7 @@ def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
         raise StudyError(
             "This session is not running",
             f"No program has {folder.name} open, so there is nothing to stop or to pause.",
-            "Look at it with: hapteq watch " + str(folder.path),
+            f"Look at it with: hapteq watch {shlex.quote(str(folder.path))}",
         )
     inbox = RequestInbox(folder.path)
     request_name = inbox.send(request)

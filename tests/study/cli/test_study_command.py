@@ -119,11 +119,11 @@ def test_a_simulated_participant_does_not_take_a_persons_code(run, small_file, t
 
 
 def test_the_help_names_every_observer(run):
-    from study.participants.observer_catalogue import OBSERVER_DESCRIPTIONS
+    from study.participants.observer_catalogue import OBSERVERS
 
     _, out, _ = run("study", "--help")
     said = "".join(out.split())
-    assert all(name in said for name in OBSERVER_DESCRIPTIONS)
+    assert all(name in said for name in OBSERVERS)
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from study.cli.conduct import make_simulated_code
 from study.cli.main import main
 from study.session.facts.events import DeviceFacts
 from study.session.views.participant_codes import is_code
-from study.session.watching.requests import PauseAsked, StopAsked
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.event_log import LOG_NAME, EventLog, read_log, read_opening
 from study.store.sessions.request_inbox import RequestInbox
 
@@ -64,6 +64,24 @@ def run(capsys, data, *arguments: str) -> tuple[int, str, str]:
 
 def test_the_light_name_of_the_log_is_the_logs():
     assert watch.LOG_NAME == LOG_NAME
+
+
+def test_of_two_sessions_of_a_name_the_one_that_runs_gets_the_request(capsys, data, running, tmp_path, monkeypatch):
+    """The stop went to the session in the current folder, which did not run, and the handle went on moving."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(data / "S1_001", "S1_001")
+    log = (tmp_path / "S1_001" / LOG_NAME).read_bytes()
+    assert run(capsys, data, "watch", "S1_001", "--note", "hurt", "--stop")[0] == 0
+    assert running == [StopAsked("experimenter"), NoteAsked("experimenter", "hurt")]
+    assert (tmp_path / "S1_001" / LOG_NAME).read_bytes() == log
+
+
+def test_where_neither_of_two_sessions_of_a_name_runs_a_note_needs_the_path(capsys, data, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(data / "S1_001", "S1_001")
+    code, _out, err = run(capsys, data, "watch", "S1_001", "--note", "hurt")
+    assert code == 2 and "Two sessions have this name" in err
+    assert b"hurt" not in (tmp_path / "S1_001" / LOG_NAME).read_bytes()
 
 
 def test_once_tells_how_it_stands(capsys, data):

@@ -4,6 +4,7 @@ import errno
 import io
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,9 @@ def test_a_question_without_an_answer_erases_nothing_and_says_so(run, data, monk
     assert code == ExitCode.INTERRUPTED
     assert "Nothing was erased." in err and "--yes" in err
     assert (data / "P01_001" / "events.jsonl").exists()
+    (data / "P01.withdrawal.json").write_text("{}")  # as an interrupted withdrawal leaves it
+    _, _, err = run("withdraw", "P01_001", "--data", data)
+    assert "Nothing was erased." not in err and "no session of P01 counts as data any more" in err
 
 
 def test_withdrawal_leaves_what_others_put_beside_the_analysis(run, data):
@@ -79,6 +83,28 @@ def test_a_session_that_is_being_written_is_not_withdrawn(run, data):
     assert code == 1
     assert "Another program is writing to P01_001" in err
     assert (data / "P01_001" / "trials.csv").exists()
+
+
+def test_an_analysis_of_all_in_the_folder_of_another_session_is_named(run, data):
+    """That participant's withdrawal alone would erase it."""
+    shutil.copytree(data / "P01_001", data / "P02_001")
+    log = data / "P02_001" / "events.jsonl"
+    log.write_text(log.read_text().replace("P01", "P02"))
+    assert run("analyze", data, "--out", data / "P02_001" / "all")[0] == 0
+    code, _, err = run("withdraw", "P01_001", "--data", data, "--yes")
+    assert code == 0
+    assert f"Written with --out, and not erased: {data / 'P02_001' / 'all'}" in err
+
+
+def test_an_analysis_of_linked_sessions_is_named_where_the_sessions_are(run, data):
+    combined, export = data.parent / "combined", data.parent / "export"
+    combined.mkdir()
+    (combined / "P01_001").symlink_to(data / "P01_001")
+    assert run("analyze", combined)[0] == run("export", combined, "--out", export)[0] == 0
+    code, _, err = run("withdraw", "P01_001", "--data", data, "--yes")
+    assert code == 0
+    for path in (combined / "analysis", export):
+        assert f"Written with --out, and not erased: {path}" in err
 
 
 @pytest.mark.parametrize("where", ["data/analysis", "data/P01_001/analysis", "elsewhere"])

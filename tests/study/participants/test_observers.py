@@ -14,7 +14,7 @@ from study.participants.detection_thresholds import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.intensity_cue import IntensityCue
 from study.participants.observer import Observer, PerceivedStimulus
-from study.participants.observer_catalogue import OBSERVER_DESCRIPTIONS, find_observer
+from study.participants.observer_catalogue import OBSERVERS, find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N
 from tests.slow_instances import slow, slow_rows
 
@@ -206,7 +206,7 @@ def test_a_drift_raises_the_detection_threshold_too():
     )
 
 
-@pytest.mark.parametrize("name", OBSERVER_DESCRIPTIONS)
+@pytest.mark.parametrize("name", OBSERVERS)
 def test_a_catch_trial_is_answered_as_any_other_trial_at_its_level(name):
     observer = find_observer(name, 1)
     felt = trials(level_n=3.0)[:200]
@@ -229,7 +229,7 @@ def test_the_scripted_observer_looks_at_run_and_trial_alone():
     assert right(2, 3, 0.1, 99) == script
 
 
-@pytest.mark.parametrize("name", OBSERVER_DESCRIPTIONS)
+@pytest.mark.parametrize("name", OBSERVERS)
 def test_the_same_trial_gets_the_same_reply_in_any_order_of_asking(name):
     felt = trials()[:200]
     forward = [find_observer(name, 5).reply(each, 5) for each in felt]
@@ -256,7 +256,7 @@ def test_response_times_are_those_of_people_and_say_nothing_about_the_answer():
     assert abs(np.corrcoef(times_s, [reply.answer for reply in replies])[0, 1]) < 4 / np.sqrt(N)
 
 
-@pytest.mark.parametrize("name", OBSERVER_DESCRIPTIONS)
+@pytest.mark.parametrize("name", OBSERVERS)
 def test_every_listed_name_is_an_observer(name):
     assert find_observer(name, 3).name == ("person_1_seed_3" if name == "person" else name)
 
@@ -269,7 +269,7 @@ def test_an_unknown_name_is_refused_with_the_names_there_are():
     with pytest.raises(WrongUseError) as caught:
         find_observer("gueser", 0)
     assert caught.value.happened == "No observer is called gueser. Did you mean guesser?"
-    assert caught.value.do_now == f"Choose one of {', '.join(OBSERVER_DESCRIPTIONS)}."
+    assert caught.value.do_now == f"Choose one of {', '.join(OBSERVERS)}."
 
 
 def test_a_name_like_nothing_gets_no_guess():

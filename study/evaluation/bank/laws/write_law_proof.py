@@ -2,11 +2,10 @@
 
 `write_law_proof` writes into the folder of the test: `proof.json` (all figures) and `proof.csv` (one row per case).
 `write_law_table` writes figures and misses as small CSV tables that can be kept under version control.
-`format_law_lines` and `format_law_summary` return the result as text for the terminal and as JSON. A miss is a case
-with a wrong answer (`LawOutcome.is_wrong`).
+`format_law_lines` and `summarise_law_blind_test` return the result as text for the terminal and as JSON values. A miss
+is a case with a wrong answer (`LawOutcome.is_wrong`).
 """
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -108,10 +107,10 @@ def format_law_lines(result: LawBlindTest) -> Iterator[str]:
     yield f"Everything is in {result.folder.path}"
 
 
-def format_law_summary(result: LawBlindTest) -> str:
-    """Format the result as JSON text."""
+def summarise_law_blind_test(result: LawBlindTest) -> dict[str, Any]:
+    """Summarise the result as JSON values."""
     summary = {"folder": str(result.folder.path), "unanswered": count_unanswered_cases(result.outcomes)}
-    return json.dumps(summary | _collect_shared_fields(result), indent=2)
+    return summary | _collect_shared_fields(result)
 
 
 def _collect_shared_fields(result: LawBlindTest) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from study.evaluation.challenge.concealed_effect import (
     Values,
     replace_amplifier_cells,
     replace_handle_forces,
+    replace_sensor,
 )
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import POSITION_DAMPING
@@ -74,9 +75,8 @@ DECOYS = (
             "bend": context.interpolate_log(0.3, 1.5) / context.peak_mps2.max(),
             "play": context.interpolate_log(0.03, 0.8),
         },
-        lambda device, axis, values: replace(
-            device,
-            sensor=replace(device.sensor, inverse_saturation=values["bend"], play_half_width_mps2=values["play"]),
+        lambda device, axis, values: replace_sensor(
+            device, {"inverse_saturation": values["bend"], "play_half_width_mps2": values["play"]}
         ),
     ),
     ConcealedEffect(

@@ -10,21 +10,19 @@ strength interpolates the range of the main parameter geometrically. `challenge.
 were chosen by hand; `axis` is not used where an effect acts on all channels.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, replace_sensor
 from study.evaluation.challenge.device import Device
 
 
-def _set_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
-    """Replace the value of a channel in a copy of the table (3,)."""
-    new_table = table.copy()
-    new_table[axis] = value
-    return new_table
+def _replace_channel(device: Device, parameter: str, axis: int, value: float) -> Device:
+    """Replace the value of a channel in a parameter (3,) of the sensor; returns a new device."""
+    table = getattr(device.sensor, parameter).copy()
+    table[axis] = value
+    return replace_sensor(device, {parameter: table})
 
 
 def _draw_misalignment(context: EffectContext) -> dict[str, float]:
@@ -38,7 +36,7 @@ def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
     """Replace the orientation of the sensor by the rotation, also the cross-axis sensitivity of a nuisance effect."""
     rotation_deg = np.array([values["about_x"], values["about_y"], values["about_z"]])
     orientation = Rotation.from_rotvec(rotation_deg, degrees=True).as_matrix()
-    return replace(device, sensor=replace(device.sensor, orientation=orientation))
+    return replace_sensor(device, {"orientation": orientation})
 
 
 def _draw_shares(context: EffectContext) -> dict[str, float]:
@@ -68,7 +66,7 @@ def _build_hum(device: Device, axis: int, values: Values) -> Device:
     """Set the hum amplitude * share * sin(2 pi frequency t + phase): amplitudes of sine and cosine, (2, 3), m/s^2."""
     amplitudes = values["amplitude"] * _stack_shares(values)
     hum_mps2 = np.array([np.cos(values["phase"]) * amplitudes, np.sin(values["phase"]) * amplitudes])
-    return replace(device, sensor=replace(device.sensor, hum_mps2=hum_mps2, hum_hz=values["frequency"]))
+    return replace_sensor(device, {"hum_mps2": hum_mps2, "hum_hz": values["frequency"]})
 
 
 def _draw_cross_axis(context: EffectContext) -> dict[str, float]:
@@ -84,76 +82,63 @@ def _build_cross_axis(device: Device, axis: int, values: Values) -> Device:
     mixing = device.sensor.orientation.copy()
     mixing[axis, (axis + 1) % 3] = values["from_next"]
     mixing[axis, (axis + 2) % 3] = values["from_after_next"]
-    return replace(device, sensor=replace(device.sensor, orientation=mixing))
+    return replace_sensor(device, {"orientation": mixing})
 
 
 EFFECTS = (
     ConcealedEffect(
         "sensor_lag", "sensor", False,
         lambda context: {"bandwidth": context.interpolate_log(420.0, 30.0)},
-        lambda device, axis, values: replace(device, sensor=replace(device.sensor, bandwidth_hz=values["bandwidth"])),
+        lambda device, axis, values: replace_sensor(device, {"bandwidth_hz": values["bandwidth"]}),
     ),
     ConcealedEffect(
         "sensor_clipping", "sensor", True,
         lambda context: {"limit": context.peak_mps2[context.axis] * (1.0 - context.interpolate_log(0.02, 0.7))},
-        lambda device, axis, values: replace(
-            device,
-            sensor=replace(device.sensor, range_mps2=_set_channel(device.sensor.range_mps2, axis, values["limit"])),
-        ),
+        lambda device, axis, values: _replace_channel(device, "range_mps2", axis, values["limit"]),
     ),
     ConcealedEffect("sensor_misalignment", "sensor", False, _draw_misalignment, _build_misalignment),
     ConcealedEffect(
         "sensor_gain", "sensor", True,
         lambda context: {"gain": 1.0 + context.draw_sign() * context.interpolate_log(0.005, 0.3)},
-        lambda device, axis, values: replace(
-            device, sensor=replace(device.sensor, gain=_set_channel(device.sensor.gain, axis, values["gain"]))
-        ),
+        lambda device, axis, values: _replace_channel(device, "gain", axis, values["gain"]),
     ),
     ConcealedEffect(
         "sensor_nonlinearity", "sensor", True,
         lambda context: {
             "cubic": context.draw_sign() * context.interpolate_log(0.005, 0.25) / context.peak_mps2[context.axis] ** 2
         },
-        lambda device, axis, values: replace(
-            device,
-            sensor=replace(device.sensor, cubic_gain=_set_channel(device.sensor.cubic_gain, axis, values["cubic"])),
-        ),
+        lambda device, axis, values: _replace_channel(device, "cubic_gain", axis, values["cubic"]),
     ),
     ConcealedEffect(
         "sensor_drift", "sensor", False,
         lambda context: {"total": context.draw_sign() * context.interpolate_log(0.01, 2.0)} | _draw_shares(context),
-        lambda device, axis, values: replace(
-            device, sensor=replace(device.sensor, drift_mps2=values["total"] * _stack_shares(values))
-        ),
+        lambda device, axis, values: replace_sensor(device, {"drift_mps2": values["total"] * _stack_shares(values)}),
     ),
     ConcealedEffect(
         "quantization", "sensor", False,
         lambda context: {"step": context.interpolate_log(0.02, 1.5)},
-        lambda device, axis, values: replace(device, sensor=replace(device.sensor, resolution_mps2=values["step"])),
+        lambda device, axis, values: replace_sensor(device, {"resolution_mps2": values["step"]}),
     ),
     ConcealedEffect("mains_hum", "sensor", False, _draw_hum, _build_hum),
     ConcealedEffect(
         "clock_drift", "sensor", False,
         lambda context: {"ppm": context.draw_sign() * context.interpolate_log(0.5, 100.0)},
-        lambda device, axis, values: replace(device, sensor=replace(device.sensor, clock_error_ppm=values["ppm"])),
+        lambda device, axis, values: replace_sensor(device, {"clock_error_ppm": values["ppm"]}),
     ),
     ConcealedEffect(
         "lost_samples", "sensor", False,
         lambda context: {"fraction": context.interpolate_log(1e-4, 0.04)},
-        lambda device, axis, values: replace(device, sensor=replace(device.sensor, lost_fraction=values["fraction"])),
+        lambda device, axis, values: replace_sensor(device, {"lost_fraction": values["fraction"]}),
     ),
     ConcealedEffect("cross_axis_sensitivity", "sensor", True, _draw_cross_axis, _build_cross_axis),
     ConcealedEffect(
         "sensor_offset", "sensor", True,
         lambda context: {"offset": context.draw_sign() * context.interpolate_log(5e-4, 0.5)},
-        lambda device, axis, values: replace(
-            device,
-            sensor=replace(device.sensor, offset_mps2=_set_channel(device.sensor.offset_mps2, axis, values["offset"])),
-        ),
+        lambda device, axis, values: _replace_channel(device, "offset_mps2", axis, values["offset"]),
     ),
     ConcealedEffect(
         "logger_offset", "sensor", False,
         lambda context: {"offset": context.draw_sign() * context.interpolate_log(1e-5, 5e-3)},
-        lambda device, axis, values: replace(device, sensor=replace(device.sensor, delay_s=values["offset"])),
+        lambda device, axis, values: replace_sensor(device, {"delay_s": values["offset"]}),
     ),
 )  # fmt: skip

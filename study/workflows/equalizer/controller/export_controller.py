@@ -84,7 +84,8 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
         )
     model = read_identified_model(plan.model)
     try:
-        _require_force_model(model)
+        if model.D.shape != (3, 3) or model.input_unit != "N" or model.output_unit != "m/s^2":
+            raise TrackingError("the model is not of three forces (N) and three accelerations (m/s^2)")
         transient = None if plan.transient is None else _read_transient(plan.transient, model)
         controller = make_realtime_controller(model, transient, plan.settings)
         cases = compute_controller_cases(controller)
@@ -171,13 +172,6 @@ def _read_transient(path: Path, model: IdentifiedModel) -> FloatArray:
             (f"the table {path.name} has {len(table.signal)} rows; a controller takes {MAX_TRANSIENT_ROWS}",)
         )
     return table.signal.samples
-
-
-def _require_force_model(model: IdentifiedModel) -> None:
-    """Require a model of three forces (N) and three accelerations (m/s²), the units of the exported loop and of its
-    cap. Raises TrackingError."""
-    if model.D.shape != (3, 3) or model.input_unit != "N" or model.output_unit != "m/s^2":
-        raise TrackingError("the model is not of three forces (N) and three accelerations (m/s^2)")
 
 
 def _describe_origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:

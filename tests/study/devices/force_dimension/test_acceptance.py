@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+import os
 import time
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -97,9 +98,15 @@ def test_an_acceptance_expires_and_must_not_be_dated_in_the_future(stub, vendor,
         assert f"It was accepted on {day}" in refused(rigs)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "hapteq-acceptance"}', "null", "\x00"])
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "hapteq-acceptance"}', "null", "\x00", "[" * 100_000])
 def test_a_file_that_is_no_acceptance_unlocks_nothing(stub, rigs, text):
     locate_acceptance_file().write_text(text)
+    assert "is no acceptance" in refused(rigs)
+
+
+def test_a_pipe_in_the_place_of_the_acceptance_unlocks_nothing(stub, rigs):
+    locate_acceptance_file().unlink(missing_ok=True)
+    os.mkfifo(locate_acceptance_file())
     assert "is no acceptance" in refused(rigs)
 
 

@@ -1,5 +1,8 @@
 """A calibration put into the lab's file: nothing else of it changes, and nothing at all where it cannot be."""
 
+import os
+from pathlib import Path
+
 import pytest
 
 from study.devices.accelerometer.calibration import Calibration
@@ -54,7 +57,31 @@ def test_a_new_calibration_takes_the_place_of_the_old_one_alone(file):
     assert lab.accelerometer is not None and lab.accelerometer.baud == 115_200
     assert lab.accelerometer.sensitivity == tuple(map(tuple, IDEAL.sensitivity.tolist()))
     assert file.with_name("device.toml.before").read_text() == OLD
-    assert not file.with_name("device.toml.new").exists()
+    assert sorted(path.name for path in file.parent.iterdir()) == ["device.toml", "device.toml.before"]
+
+
+def test_the_file_stays_in_place_where_the_disk_fails_as_it_is_replaced(file, monkeypatch):
+    """Without it, the next session would run with the default masses and no sensor."""
+    file.parent.mkdir()
+    file.write_text(OLD)
+    replace = Path.replace
+
+    def fail(path, target):
+        if target == file:
+            raise OSError(28, "No space left on device")
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(DeviceError, match="was not kept.*The disk is full"):
+        write_sensor_table(TABLE)
+    assert file.read_text() == OLD
+
+
+def test_a_pipe_in_the_place_of_the_file_is_refused_at_once(file):
+    file.parent.mkdir()
+    os.mkfifo(file)
+    with pytest.raises(DeviceError, match="cannot be used.*it is a pipe"):
+        read_lab_settings()
 
 
 def test_comments_above_the_next_table_are_not_those_of_the_old_calibration(file):

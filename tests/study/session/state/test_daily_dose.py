@@ -12,7 +12,7 @@ from study.session.state.sitting_state import (
     resume_sitting,
     start_motion,
 )
-from study.session.state.vibration_dose import Dose
+from study.session.state.vibration_dose import Dose, compute_a8_mps2
 
 MORNING = datetime.fromisoformat("2026-01-01T08:00:00.000+00:00")
 
@@ -34,6 +34,13 @@ def test_sessions_of_the_same_day_add_up_and_those_before_a_night_do_not():
     assert found is not None
     assert found.sessions == ("P01_002", "P01_003")
     assert (found.squared_s, found.vibrated_s, found.still_s) == (500.0, 50.0, 3600.0)
+
+
+def test_a_dose_that_only_a_wrong_sensor_gives_does_not_keep_the_next_session_from_beginning():
+    shaken = replace(session(0, 1, 20.0), dose=Dose(1e12, 20.0, 0.0))
+    found = find_dose_elsewhere({"P01_001": shaken}, "P01_002", at(2))
+    fresh = set_dose_elsewhere(SittingState(last_moment=Moment(at(2))), found)
+    assert compute_a8_mps2(compute_daily_dose(fresh)) > 100.0
 
 
 def test_own_movements_join_two_others_into_one_day_and_are_not_counted_twice():

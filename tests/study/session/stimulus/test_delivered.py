@@ -47,6 +47,14 @@ def test_less_than_a_period_is_no_measurement():
     assert measure_delivered(recording(30, 4.0, 0.0), DIRECTION, 25.0) is None
 
 
+@pytest.mark.parametrize("amplitude", [1e7, 1e300])
+def test_an_acceleration_that_no_handle_has_is_no_measurement(amplitude):
+    """The log refused it, and each answer ended the program."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        assert measure_delivered(recording(1000, amplitude, 0.0), DIRECTION, 25.0) is None
+        assert measure_delivered(recording(1000, 0.0, amplitude), DIRECTION, 25.0) is None
+
+
 def test_harmonics_are_measured_over_all_axes_and_not_where_there_are_none():
     whole = recording(1000, 4.0, 1.5)
     w = 2 * np.pi * 25.0 * np.arange(1000) / RATE_HZ

@@ -1,6 +1,10 @@
+from dataclasses import replace
+
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from protocols.definition.participant_text import Question, TextSettings
 from study.session.views.form_entry import (
     MAX_TEXT_CHARACTERS,
     FormEntry,
@@ -11,7 +15,17 @@ from study.session.views.form_entry import (
     make_reply,
     paste_text,
 )
-from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
+from study.session.views.form_views import (
+    Form,
+    FormField,
+    FormKind,
+    FormReply,
+    NumberLimits,
+    encode_answers,
+    find_missing_fields,
+)
+from study.session.views.forms import judge_form, make_form
+from study.store.formats.protocol_files import read_study_protocol
 
 YES_NO = ("yes", "no")
 EXCLUSION = Form(FormKind.EXCLUSION, "T", "", tuple(FormField(f"q{i}", f"Question {i}", YES_NO) for i in range(3)))
@@ -90,3 +104,27 @@ def test_no_key_touches_an_answer_other_than_that_under_the_cursor(keys, stacked
         assert not after.is_sent or find_missing_fields(EXCLUSION, make_reply(after)) == ()
         assert not entry.is_sent or after == entry
         entry = after
+
+
+@pytest.mark.parametrize(
+    ("typed", "logged"),
+    [("123456789012", "123456789012"), ("1234567,875", "1234567.875"), ("007,50", "7.5"), ("+3.", "3")],
+)
+def test_a_number_is_logged_with_the_digits_that_were_typed(typed, logged):
+    form = Form(FormKind.DEBRIEF, "", "", (FormField("n", "Which?", limits=NumberLimits(0.0, 1e14), needed=False),))
+    assert encode_answers(form, FormReply({"n": typed})) == {"n": logged}
+
+
+def test_blanks_around_the_words_of_a_translation_or_a_choice_keep_no_form_from_being_sent():
+    """The consent of a person who typed the word for yes was logged as a refusal."""
+    protocol = replace(
+        read_study_protocol("direction_threshold").protocol,
+        text=TextSettings("fr", {"yes": "oui ", "no": " non"}),
+        before=(Question("hand", "Which?", choices=("right ", "left")),),
+    )
+    for kind, key in ((FormKind.CONSENT, "1"), (FormKind.EXCLUSION, "2"), (FormKind.QUESTIONNAIRE, "1")):
+        form = make_form(protocol, kind)
+        assert form is not None
+        entry = typed(form, *[key, "enter"] * len(form.fields), "enter")
+        assert entry.is_sent and judge_form(protocol, form, make_reply(entry)).passed
+        assert form.fields[0].choices[0] == form.fields[0].choices[0].strip()

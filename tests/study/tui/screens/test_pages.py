@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from study.errors import StudyError
 from study.session.views.participant_views import (
     DemoDone,
     DemoMenu,
@@ -20,7 +21,7 @@ from study.session.views.participant_views import (
     Welcome,
 )
 from study.tui.app.outcomes import make_failure_outcome
-from study.tui.engine.from_engine import ErrorText, Failed
+from study.tui.engine.from_engine import Failed
 from study.tui.keys.answer_keys import parse_keys
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.demo import DemoScreen
@@ -105,7 +106,7 @@ def test_the_end_says_what_is_saved_and_why_it_ended(read):
 
 
 def test_the_end_can_be_read_and_left_in_a_small_window(on_stage):
-    error = ErrorText("Interrupted", "It ended. " * 30, "Saved. " * 30, "Do this. " * 30 + "Last.", 1)
+    error = StudyError("Interrupted", "It ended. " * 30, "Do this. " * 30 + "Last.", "Saved. " * 30)
 
     async def story(stage):
         assert "Q Leave" in stage.words

@@ -115,6 +115,9 @@ def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, s
     yesterday = judge_last_check(INFO)
     assert yesterday.warning and "none today; the last one was 2020-01-01" in yesterday.value
     assert "hapteq doctor --device omega3 --daily" in yesterday.advice
+    # A check made while the clock was wrong would hide every later one.
+    path.with_name("4.json").write_text(path.read_text().replace("2020-01-01", "2100-01-01"))
+    assert judge_last_check(INFO) == yesterday
 
 
 def test_another_baseline_than_the_accepted_one_is_refused_before_anything_moves(two_days, stepped_stub):

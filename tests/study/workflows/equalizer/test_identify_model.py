@@ -210,6 +210,10 @@ def test_recordings_of_two_grips_or_under_two_springs_make_no_one_model(plants, 
     plan = IdentifyPlan((tmp_path / "0.h5", tmp_path / "loose.h5"), tmp_path / "m.h5", with_spring=True)
     with pytest.raises(StudyError, match=r"differ in the spring \(50 N/m, 0 N s/m; none\)"):
         identify_model(plan, lambda share: None)
+    write_recording(tmp_path / "text.h5", recorded(plants, noise, (), feedback={"stiffness_n_per_m": "50 N/m"}))
+    plan = IdentifyPlan((tmp_path / "0.h5", tmp_path / "text.h5"), tmp_path / "m.h5", with_spring=True)
+    with pytest.raises(StudyError, match=r"state '50 N/m' as stiffness_n_per_m.*Give a number"):
+        identify_model(plan, lambda share: None)
 
 
 @pytest.mark.parametrize("hangs_at", [0.0, pytest.param(9.81, marks=pytest.mark.slow)])

@@ -53,6 +53,15 @@ def refusal(folder, tmp_path, **more) -> StudyError:
     return refused.value
 
 
+@pytest.mark.parametrize("stiffness", ["100 N/m", None, [1.0], True])
+def test_a_model_whose_spring_is_no_number_is_refused_with_its_words(folder, tmp_path, stiffness):
+    model = read_identified_model(folder / "model.h5")
+    feedback = {**model.provenance["feedback"], "stiffness_n_per_m": stiffness}
+    path = tmp_path / "text.h5"
+    write_identified_model(path, replace(model, provenance={**model.provenance, "feedback": feedback}))
+    assert "as stiffness_n_per_m of `feedback`" in refusal(folder, tmp_path, model=path).happened
+
+
 @pytest.mark.slow
 def test_the_model_gives_the_transient_that_one_gain_misses(done):
     found, told = done

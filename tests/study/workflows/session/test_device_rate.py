@@ -7,6 +7,7 @@ import pytest
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from protocols.document.dumping import dump_protocol
 from study.errors import DeviceError
 from study.store.formats.recording_file import write_recording
 from study.store.sessions.archive import list_session_folders
@@ -48,3 +49,13 @@ def test_a_fade_that_is_no_tick_of_the_device_begins_no_sitting(sitter, device_a
     sitter.protocol = replace(sitter.protocol, stimulus=replace(sitter.protocol.stimulus, fade_out_s=0.003))
     with pytest.raises(DeviceError, match=r"0.003 s .* no more than half a tick.*Nothing moved.*at least 0.00625 s"):
         conduct_new(sitter.plan(), device_at(160.0), sitter.participant())
+
+
+def test_nor_is_a_session_resumed_whose_fade_is_no_tick_of_the_device(sitter, device_at):
+    sitter.protocol = replace(sitter.protocol, stimulus=replace(sitter.protocol.stimulus, fade_out_s=0.003))
+    sitter.text = dump_protocol(sitter.protocol)
+    folder = sitter.interrupted(3).folder
+    lines = folder.log.read_bytes()
+    with pytest.raises(DeviceError, match=r"0.003 s .* no more than half a tick.*Nothing moved"):
+        conduct_resumed(folder, device_at(160.0), sitter.participant())
+    assert folder.log.read_bytes() == lines

@@ -67,6 +67,25 @@ def trials_of(done):
     return [(t.run, t.trial, t.level_n, t.answer) for t in done.state.trials if t.is_valid]
 
 
+@pytest.mark.parametrize("factor", [1e12, 1e-12])
+def test_a_sensor_whose_sensitivity_is_set_wrong_ends_no_session(briefly_probed, monkeypatch, factor):
+    """The log refused its accelerations, and each answer ended the program."""
+    release = SafeDevice.release
+
+    def release_scaled(device):
+        if (recording := (result := release(device)).recording) is None:
+            return result
+        response = replace(recording.response, samples=factor * recording.response.samples)
+        return replace(result, recording=replace(recording, response=response))
+
+    monkeypatch.setattr(SafeDevice, "release", release_scaled)
+    done = briefly_probed.whole()
+    assert done.end_reason == "" and done.state.closed
+    probe = next(event for event in events_of(done.folder) if isinstance(event, ProbeMeasured))
+    assert probe.rms_mps2 is None if factor > 1 else probe.apparent_mass_kg is None
+    assert all(trial.delivered_mps2 is None for trial in done.state.trials) == (factor > 1)
+
+
 def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(whole):
     done = whole
     assert done.end_reason == ""

@@ -10,7 +10,7 @@ from study.errors import StudyError
 from study.evaluation.bank.laws import prove_laws as prove_laws_module
 from study.evaluation.bank.laws.prove_laws import LawBlindTest, prove_laws, reveal_laws
 from study.evaluation.bank.laws.seal_laws import get_fresh_motions_path, read_fresh_motions, seal_laws
-from study.evaluation.bank.laws.write_law_proof import format_law_lines, format_law_summary, write_law_proof
+from study.evaluation.bank.laws.write_law_proof import format_law_lines, summarise_law_blind_test, write_law_proof
 from study.evaluation.bank.proof_folder import (
     ANSWER_FILE,
     RECORDING_FILE,
@@ -95,7 +95,7 @@ def test_a_case_whose_process_was_killed_is_said_and_how_to_go_on(sealed, tmp_pa
     monkeypatch.setattr(prove_laws_module, "diagnose_and_count", die)
     done = prove_laws(tmp_path / "copy", BankPlan(SEED, 1, brief=True), BankOptions(), lambda what, done, of: None)
     assert any("1 case has no answer" in line and "same command again" in line for line in format_law_lines(done))
-    assert json.loads(format_law_summary(done))["unanswered"] == 1
+    assert summarise_law_blind_test(done)["unanswered"] == 1
 
 
 @pytest.mark.slow

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from protocols.definition.participant_text import Question
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
+from study.errors import UserInterruptError
 from study.participants.observer_catalogue import find_observer
 from study.session.facts.events import (
     DemoPlayed,
@@ -18,8 +20,9 @@ from study.session.facts.events import (
 )
 from study.session.views.form_views import FormKind, FormReply
 from study.session.views.participant_views import Task
+from study.store.sessions.archive import list_session_folders
 from study.workflows.results.fold_session import fold_session
-from study.workflows.session.conduct_session import Participant, conduct_new
+from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.simulated_display import SimulatedDisplay
 from tests.study.workflows.session.sitting.person import Person, of
 
@@ -38,6 +41,20 @@ def test_a_whole_sitting_from_consent_to_debrief(plan, full, seat, person):
     assert fold_session(end.folder).state == end.state
     assert [event.form for event in of(end, FormFilled)] == ["consent", "exclusion", "setup", "debrief"]
     assert all(event.answers == {} for event in of(end, FormFilled) if event.form == "exclusion")
+
+
+def test_where_only_closing_questions_are_left_no_instructions_ask_for_the_handle(plan, small_protocol, seat, clock):
+    class Leaver(Person):
+        def fill_in(self, form):
+            raise KeyboardInterrupt
+
+    protocol, leaver = replace(small_protocol, debrief=(Question("strategy", "How?"),)), Leaver(clock)
+    with pytest.raises(UserInterruptError):
+        conduct_new(plan(protocol), "simulated", replace(seat, display=leaver, hand=leaver))
+    returned = Person(clock)
+    (folder,) = list_session_folders(plan(protocol).data_folder)
+    end = conduct_resumed(folder, "simulated", replace(seat, display=returned, hand=returned))
+    assert returned.calls == [FormKind.DEBRIEF] and end.state.closed
 
 
 @pytest.mark.slow

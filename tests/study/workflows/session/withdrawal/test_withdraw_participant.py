@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shlex
 import shutil
 from pathlib import Path
 
@@ -72,6 +73,9 @@ def test_a_link_inside_a_session_goes_and_what_it_leads_to_stays(data, elsewhere
         shutil.rmtree(link)
     link.unlink(missing_ok=True)
     link.symlink_to(elsewhere if name != "trials.csv" else elsewhere / "trials.csv")
+    # Recordings that were moved to another disk would stay there, and nothing would say where.
+    told = f"P01_001/{name} is a link; what it leads to was not touched: {link.readlink()}."
+    assert told in plan_withdrawal(SessionFolder(data / "P01_001")).doubtful
     erase(data)
     assert not link.is_symlink()
     assert {path.name for path in (data / "P01_001").iterdir()} <= {"withdrawn.json", "session.lock"}
@@ -108,6 +112,21 @@ def test_what_was_made_from_others_alone_stays(data):
     )  # fmt: skip
 
 
+def test_an_analysis_whose_report_says_that_the_participant_was_left_out_is_erased(data):
+    """Such as of a person who was excluded: the numbers are those of others."""
+    shutil.rmtree(data / "analysis")
+    for folder, session in (("analysis", "P01_002"), ("others", "P010_002")):
+        write_analysis(data / folder, "P02")
+        (data / folder / "report.html").write_text(f"{session} does not take part: excluded.")
+    (data / "notes").mkdir()
+    (data / "notes" / "report.html").write_text("P01_001 was late")
+    assert plan_withdrawal(SessionFolder(data / "P01_001")).derived_roots == ("analysis",)
+    erase(data)
+    assert not (data / "analysis").exists()
+    assert (data / "others" / "report.html").exists()
+    assert (data / "notes" / "report.html").exists()
+
+
 def test_an_analysis_that_does_not_say_whose_it_is_is_listed(data):
     (data / "analysis" / "thresholds.csv").unlink()
     for figure in (data / "analysis" / "figures").iterdir():
@@ -118,8 +137,15 @@ def test_an_analysis_that_does_not_say_whose_it_is_is_listed(data):
     assert (data / "analysis" / "report.html").exists()
 
 
+def test_a_session_of_a_very_long_protocol_is_the_participants(data):
+    log = data / "P01_002" / "events.jsonl"
+    log.write_text(log.read_text().replace('"protocol_text":"', f'"protocol_text":"#{"-" * 2**21}', 1))
+    assert plan_withdrawal(SessionFolder(data / "P01_001")).sessions == ("P01_001", "P01_002")
+
+
 def test_copies_that_name_the_participant_are_named(data, tmp_path):
     copied = shutil.copytree(data / "P01_001", data / "P01_001 (copy)")
+    shutil.copytree(data / "P01_002", data / "backup of May" / "P01_002")
     (data / "todo.txt").write_text("call P01_002 again")
     (data / "P010_001.txt").write_text("P010_001 is another participant")
     for out in ("out", "other_study"):
@@ -130,6 +156,7 @@ def test_copies_that_name_the_participant_are_named(data, tmp_path):
     done = CliRunner().invoke(app, ["withdraw", "P01_001", "--data", str(data), "--yes"])
     assert done.exit_code == 0, done.output
     assert "P01_001 (copy) holds a log of P01 under another name" in done.output
+    assert "Not to be erased: backup of May/P01_002 is named like a session of P01." in done.output
     assert "Not to be erased: todo.txt names P01." in done.output
     assert "P010" not in done.output
     assert f"Written with --out, and not erased: {tmp_path / 'out'}" in done.output
@@ -141,8 +168,9 @@ def test_copies_that_name_the_participant_are_named(data, tmp_path):
 def test_a_running_session_stops_the_withdrawal_before_anything_is_changed(data):
     before = files(data)
     log = EventLog.reopen(data / "P01_002" / "events.jsonl")
-    with pytest.raises(StudyError, match="Another program is writing to P01_002"):
+    with pytest.raises(StudyError, match="Another program is writing to P01_002") as told:
         erase(data)
+    assert told.value.do_now == f"Close it there first. Then erase with: hapteq withdraw P01_002 --data {data}"
     log.close()
     assert {name: held for name, held in files(data).items() if not name.endswith("session.lock")} == before
 
@@ -253,3 +281,19 @@ def test_tables_written_while_the_participant_withdrew_are_removed(data, monkeyp
     with pytest.raises(SessionWithdrawnError, match="This session was withdrawn"):
         session_results.write_tables(folder)
     assert {path.name for path in folder.path.iterdir()} == {"session.lock", "withdrawn.json"}
+
+
+def test_the_command_that_continues_a_withdrawal_holds_where_the_path_has_blanks(data, monkeypatch):
+    data = data.rename(data.with_name("my data"))
+    monkeypatch.setattr(
+        "study.workflows.session.withdraw_participant.write_tombstone", lambda *_: (data / "none").stat()
+    )
+    with pytest.raises(StudyError, match="Not everything could be erased") as told:
+        erase(data)
+    monkeypatch.undo()
+    continued = f"hapteq withdraw P01_001 --data '{data}'"
+    assert told.value.do_now == f"Correct this and continue with: {continued}"
+    assert continued in validate_file(data / "P01_001").problems[1]
+    done = CliRunner().invoke(app, [*shlex.split(continued)[1:], "--yes"])
+    assert done.exit_code == 0, done.output
+    assert validate_file(data / "P01_001").problems == ()
