@@ -55,6 +55,12 @@ _NUMBER_PATTERN = re.compile(r"\d+")
 _MAX_LISTED_NAMES = 3
 """Largest number of names that a message lists. Chosen."""
 
+HOLD_REMARK = (
+    "The command is taken to keep each value until the next sample. If it was measured, as by a load cell, it changes "
+    'between samples: import by a map with hold = "linear", or it seems to act half a sample late.'
+)
+"""Remark on what no header says. At 1 kHz, half a sample is 8 degrees at 45 Hz."""
+
 
 def read_without_map(path: Path) -> Arrays:
     """Read the arrays of a file that no map describes. Raises CannotReadError where it cannot be read, and
@@ -127,7 +133,13 @@ def describe_header_choices(arrays: Arrays, import_map: ImportMap) -> tuple[str,
     notes += (
         [f"Rms or peak values by their unit, kept as they are: {', '.join(peak_channels)}."] if peak_channels else []
     )
-    return (f"Taken from the header: {channels_text}.", *notes, *omissions, *_describe_direction(table, import_map))
+    return (
+        f"Taken from the header: {channels_text}.",
+        *notes,
+        *omissions,
+        *_describe_direction(table, import_map),
+        HOLD_REMARK,
+    )
 
 
 def _extract_bracketed_unit(header: str) -> str:

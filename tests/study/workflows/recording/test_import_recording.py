@@ -5,9 +5,10 @@ import pytest
 from scipy.io import savemat
 
 from analysis.look.clock import check_clock
-from equalizer.signals.recording import Recording, find_parts
+from equalizer.signals.recording import Hold, Recording, find_parts
 from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
+from study.importing.header_map import HOLD_REMARK
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.disk.file_errors import CannotReadError
 from study.store.formats.recording_file import read_recording, write_recording
@@ -44,7 +45,8 @@ def test_a_table_whose_header_says_all_needs_no_map(tmp_path):
     found = read_recording(tmp_path / "r.h5")
     np.testing.assert_allclose(found.response.samples[:, 0], 9.80665 * T**2, atol=1e-7)
     assert found.sample_rate_hz == 1000
-    assert done.notes == ("Taken from the header: fx as command, ax as response.",)
+    assert done.notes == ("Taken from the header: fx as command, ax as response.", HOLD_REMARK)
+    assert found.hold is Hold.ZERO_ORDER  # as the remark says
     assert found.meta["import"] == {"map": "header", "notes": list(done.notes)}
 
 
