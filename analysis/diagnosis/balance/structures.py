@@ -93,7 +93,7 @@ def search_structures(
         regression = build_regression_with_model(motions, axis, candidate_laws, base)
         if not can_laws_explain(regression, base.least_share):
             base_only = _fit_linear_structure(regression)
-            return StructureSearch(regression, base_only, base_only, (base_only,), True)
+            return StructureSearch(regression, base_only, base_only, (base_only,), time_left())
     else:
         regression = build_regression(motions, axis, candidate_laws, turns_freely, base)
     if "cogging" not in excluded and time_left():

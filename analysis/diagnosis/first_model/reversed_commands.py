@@ -11,7 +11,8 @@ written for the commands as recorded (`recorded_conditions`).
 
 A controller, such as a virtual spring and damper on a device that a hand moves, resists the motion as well. Where a
 closed loop shows and -d v - k x with d, k >= 0 leaves at most `PREDICTED_SHARE` of the command's rms, the recordings
-determine the controller instead of the device, and are refused.
+determine the controller instead of the device, and are refused. A recorded excitation of more than that share is no
+controller's: then a device that pushes itself away, such as an upside-down pendulum, explains the command.
 """
 
 from collections.abc import Sequence
@@ -81,7 +82,11 @@ def _require_no_controller(recordings: Sequence[Recording]) -> None:
     at_readings = [replace(recording, hold=Hold.LINEAR) for recording in recordings]
     motions = compute_motions(observe_parts(at_readings, len(recordings[0].response.channels)))
     channels = recordings[0].command.channels
-    names = [name for axis, name in enumerate(channels) if _is_reversed(motions, axis, of_controller=True)]
+    names = [
+        name
+        for axis, name in enumerate(channels)
+        if not _has_own_excitation(recordings, axis) and _is_reversed(motions, axis, of_controller=True)
+    ]
     if names:
         raise NothingToDiagnoseError(
             (
@@ -92,6 +97,18 @@ def _require_no_controller(recordings: Sequence[Recording]) -> None:
                 "was recorded the wrong way round, correct it there",
             )
         )
+
+
+def _has_own_excitation(recordings: Sequence[Recording], axis: int) -> bool:
+    """Whether any recording's excitation of an axis varies by more than `PREDICTED_SHARE` of its command."""
+    return any(
+        bool(
+            np.nanstd(recording.excitation.samples[:, axis])
+            > PREDICTED_SHARE * np.nanstd(recording.command.samples[:, axis])
+        )
+        for recording in recordings
+        if recording.excitation is not None
+    )
 
 
 def _is_reversed(motions: Sequence[Motion], axis: int, of_controller: bool = False) -> bool:

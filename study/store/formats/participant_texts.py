@@ -100,6 +100,8 @@ def _fill_in_texts(
     except WrongUseError as error:
         allowed_text = f"{list_languages()}, or the path of a .toml file"
         raise ProtocolError(source, (Problem("text.language", f'is "{language}"', allowed_text),)) from error
+    if not locked_words and (problems := find_table_problems({**table, **stated_texts}, require_all=False)):
+        raise ProtocolError(source, tuple(problem.prefix_key("text.words") for problem in problems))
     protocol = protocol_from_values(translate_protocol(values, table, language_name), source)
     return protocol, dump_protocol(protocol)
 

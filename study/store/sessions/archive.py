@@ -23,6 +23,8 @@ FOLDER_PATTERN = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})"
 digits or more)."""
 TOMBSTONE_NAME = "withdrawn.json"
 """File that replaces the data in each session folder of a withdrawn participant."""
+WITHDRAWN_CLAUSE = "was withdrawn by the participant"
+"""Statement on a withdrawn session, after its name, in analyses made since: no more than its tombstone states."""
 
 
 @dataclass(frozen=True, slots=True)

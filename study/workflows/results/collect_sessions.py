@@ -15,7 +15,13 @@ from study.session.facts.events import FormFilled
 from study.session.state.state import SessionState
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.store.formats.answer_table import FORM_NAMES, FilledForm
-from study.store.sessions.archive import SessionFolder, SessionWithdrawnError, holds_session, list_session_folders
+from study.store.sessions.archive import (
+    WITHDRAWN_CLAUSE,
+    SessionFolder,
+    SessionWithdrawnError,
+    holds_session,
+    list_session_folders,
+)
 from study.store.sessions.event_log import LOG_NAME
 from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.fold_session import FoldedSession, fold_session
@@ -129,7 +135,7 @@ def _fold_sessions(folders: Sequence[SessionFolder]) -> tuple[list[tuple[Session
     exclusions: list[str] = []
     for folder in folders:
         if folder.withdrawn:
-            exclusions.append(f"{folder.name} was withdrawn by the participant.")
+            exclusions.append(f"{folder.name} {WITHDRAWN_CLAUSE}.")
             continue
         try:
             session = fold_session(folder)

@@ -20,7 +20,13 @@ from typing import Any
 from study.regular_file import MAX_DOCUMENT_BYTES, open_regular, read_regular
 from study.store.disk.real_folder import is_real_file, is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
-from study.store.sessions.archive import TOMBSTONE_NAME, SessionFolder, holds_session, is_session_name
+from study.store.sessions.archive import (
+    TOMBSTONE_NAME,
+    WITHDRAWN_CLAUSE,
+    SessionFolder,
+    holds_session,
+    is_session_name,
+)
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE_NAME
@@ -106,8 +112,8 @@ def _is_emptied_session(path: Path) -> bool:
 
 def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
     """Whether the analysis in this folder names this subject: in its tables, its statistics, the names of its figures,
-    or its report, which also lists the sessions that were left out; None where neither tables nor statistics can be
-    read and no figure names the subject."""
+    or its report, which also lists the sessions that were left out; None where no table and no statistics, or not the
+    report, can be read, and nothing else names the subject."""
     table_results = [_is_subject_in_table(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
     table_results.append(_is_subject_in_statistics(folder / STATISTICS_NAME, subject))
     if any(table_results):
@@ -115,7 +121,7 @@ def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
     figure_pattern = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
     if any(figure_pattern.fullmatch(path.name) for path in list_analysis_outputs(folder)):
         return True
-    return None if all(result is None for result in table_results) else _has_session_name(folder / PAGE_NAME, subject)
+    return None if all(result is None for result in table_results) else _is_subject_in_report(folder, subject)
 
 
 def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
@@ -216,6 +222,17 @@ def _is_subject_in_statistics(path: Path, subject: str) -> bool | None:
     seeded_subjects = [str(name).rpartition("_")[0] for name in seeds] if isinstance(seeds, dict) else []
     participants = document.get("participants")
     return subject in seeded_subjects or (isinstance(participants, list) and subject in participants)
+
+
+def _is_subject_in_report(folder: Path, subject: str) -> bool | None:
+    """Whether the report of an analysis names a session of the subject, other than as withdrawn; False without a
+    report, None where it cannot be read."""
+    path = folder / PAGE_NAME
+    session_pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(subject)}_\d{{3,}}(?!\d| {WITHDRAWN_CLAUSE})")
+    text = _read_text_file(path)
+    if text is None:
+        return None if is_real_file(path) else False
+    return session_pattern.search(text) is not None
 
 
 def _is_unmanaged_file(path: Path, subject: str) -> bool:

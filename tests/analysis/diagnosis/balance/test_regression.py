@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance import structures
 from analysis.diagnosis.balance.blocks import solve_ridge
 from analysis.diagnosis.balance.change_laws import copy_columns, keep_laws, overwrite_law, try_law
+from analysis.diagnosis.balance.given_model_base import GivenModelBase
 from analysis.diagnosis.balance.laws.law import Law, name_weights
 from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.balance.regression import MOST_RIDGE_FOLDS, build_regression, fit_all_laws, make_law_columns
@@ -156,6 +158,17 @@ def test_columns_of_parts_of_one_length_are_those_of_each_part(regression):
 def test_without_time_left_only_the_base_is_fitted(regression):
     search = search_structures(regression.motions, 0, False, frozenset(), lambda: False)
     assert not search.complete and search.regression.laws == () and search.best.laws == ()
+
+
+@pytest.mark.parametrize("is_left", [True, False])
+def test_a_given_model_that_no_law_improves_ends_the_search_which_is_complete_only_with_time(
+    regression, monkeypatch, is_left
+):
+    monkeypatch.setattr(structures, "build_regression_with_model", lambda *given: regression)
+    monkeypatch.setattr(structures, "can_laws_explain", lambda *given: False)
+    base = GivenModelBase(**dict.fromkeys(GivenModelBase.__dataclass_fields__))
+    search = search_structures(regression.motions, 0, False, frozenset(), lambda: is_left, base)
+    assert search.complete is is_left and search.best.laws == ()
 
 
 def test_an_axis_has_no_mass_and_no_damping_below_zero(regression):

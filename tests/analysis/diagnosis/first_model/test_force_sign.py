@@ -170,3 +170,27 @@ def test_a_device_under_feedback_with_an_excitation_of_its_own_is_kept(stiffness
     recording = make_recording([("u", "force", "N", command)], [("x", "position", "m", place)])
 
     assert convert_to_driven_motions((recording,)) == ((recording,), ())
+
+
+@pytest.mark.parametrize(("hand_share", "is_kept"), [(0.0, True), (1.0, False)], ids=["excited", "moved by hand"])
+def test_a_slow_device_that_pushes_itself_away_is_kept_where_its_excitation_was_recorded(hand_share, is_kept):
+    """Without a visible mass, such a device and a virtual spring under a hand have one law; the excitation differs."""
+    pushes, mass, place, speed = 3 * smooth_noise(8000, 2, width=300), 0.05, 0.0, 0.0
+    commands, places = [], []
+    for push in pushes:
+        command = (1 - hand_share) * push - 20 * place - 0.5 * speed
+        commands.append(command)
+        places.append(place)
+        for _ in range(10):
+            speed += (command + hand_share * push - 0.05 * speed + 15 * place) / mass / RATE_HZ / 10
+            place += speed / RATE_HZ / 10
+    recording = make_recording([("u", "force", "N", np.array(commands))], [("x", "position", "m", np.array(places))])
+    excitation = replace(recording.command, samples=(1 - hand_share) * pushes[:, None])
+    recording = replace(recording, excitation=excitation)
+    assert is_in_closed_loop(recording)
+
+    if is_kept:
+        assert convert_to_driven_motions((recording,)) == ((recording,), ())
+    else:
+        with pytest.raises(NothingToDiagnoseError, match="only resists the measured position and speed"):
+            convert_to_driven_motions((recording,))

@@ -52,6 +52,12 @@ def test_a_template_is_a_table_that_can_be_read_again(tmp_path, code):
     assert read_language(str(path))[1] == read_language(code)[1]
 
 
+def test_a_text_for_no_that_is_the_languages_text_for_yes_is_refused(mine):
+    """Beside the English text for yes it is no problem; a refusal would be logged as a consent."""
+    with pytest.raises(ProtocolRefusedError, match=r"text\.words\.no is the text of yes"):
+        read_study_protocol(mine('language = "de"\nwords = { no = "Ja" }'))
+
+
 def test_a_protocol_in_german_has_german_texts_and_says_so_in_its_text(mine, tmp_path):
     found = read_study_protocol(mine('language = "de"'))
     assert found.protocol.text.words["rest_title"] == "Ruhepause"

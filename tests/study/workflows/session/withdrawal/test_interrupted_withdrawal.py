@@ -1,4 +1,4 @@
-"""A withdrawal that was interrupted at any point goes on and finishes."""
+"""A withdrawal that was interrupted at any point goes on and finishes; a repeated one erases nothing more."""
 
 import json
 import os
@@ -17,9 +17,11 @@ from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import find_participant_number
+from study.workflows.session.participant_traces import MAX_SEARCHED_BYTES, is_subject_in_analysis
+from study.workflows.session.withdraw_participant import plan_withdrawal
 from study.workflows.views.view_home import list_session_lines
 from study.workflows.views.view_session import make_session_view
-from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, files
+from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, files, write_analysis
 
 PART = ".anova.json.0123abcd.part"
 
@@ -124,3 +126,23 @@ def test_killed_before_any_operation_it_continues_and_finishes(data, elsewhere, 
         assert validate_file(place / "P01_001").problems == validate_file(place / "P01_002").problems == ()
         shutil.rmtree(place)
     assert begun > 15
+
+
+def test_an_analysis_of_others_made_after_the_withdrawal_stays_when_it_is_repeated(data):
+    """Its report says that the participant withdrew, as the tombstones do."""
+    erase(data)
+    left_out = collect_sessions(data).exclusions
+    assert "P01_001 was withdrawn by the participant." in left_out
+    write_analysis(data / "analysis", "P02")
+    report = data / "analysis" / "report.html"
+    report.write_text(" ".join(left_out))
+    assert plan_withdrawal(SessionFolder(data / "P01_001")).derived == ()
+    report.write_text(f"{' '.join(left_out)} P01_001 does not take part: excluded.")
+    assert plan_withdrawal(SessionFolder(data / "P01_001")).derived_roots == ("analysis",)
+
+
+def test_a_report_too_large_to_be_searched_does_not_count_as_one_of_others(data):
+    write_analysis(data / "large", "P02")
+    assert is_subject_in_analysis(data / "large", "P01") is False
+    os.truncate(data / "large" / "report.html", MAX_SEARCHED_BYTES + 1)
+    assert is_subject_in_analysis(data / "large", "P01") is None
