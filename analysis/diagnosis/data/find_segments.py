@@ -182,15 +182,25 @@ def _extend_stretch(
     """Extend a repetition in both directions. bounds: first sample that is free, and a sample from which on the command
     repeats. Returns (start, stop); None where it repeats too seldom."""
     earliest, inside = bounds
-    differs = (np.abs(command[earliest + period :] - command[earliest:-period]) > tolerance).any(axis=1)
-    breaks = np.flatnonzero(differs) + earliest
-    after = int(np.searchsorted(breaks, inside))
-    start = int(breaks[after - 1]) + 1 if after else earliest
-    stop = (int(breaks[after]) if after < len(breaks) else len(command) - period) + period
+    later, earlier = command[earliest + period :], command[earliest : len(command) - period]
+    first = inside - earliest
+    start = inside - _count_equal(later[:first][::-1], earlier[:first][::-1], tolerance)
+    stop = inside + _count_equal(later[first:], earlier[first:], tolerance) + period
     is_repeat = stop - start >= FEWEST_PERIODS * period and _is_exact_repeat(
         command[start + period : stop], command[start : stop - period]
     )
     return (start, stop) if is_repeat else None
+
+
+def _count_equal(later: FloatArray, earlier: FloatArray, tolerance: FloatArray) -> int:
+    """Count the samples (n, m) before the first that differs, in chunks that double: most candidates differ soon."""
+    count, chunk = 0, SHORTEST_DECLARED_PERIOD
+    while count < len(later):
+        differences = np.abs(later[count : count + chunk] - earlier[count : count + chunk])
+        if len(differing := np.flatnonzero((differences > tolerance).any(axis=1))):
+            return count + int(differing[0])
+        count, chunk = count + len(differences), 2 * chunk
+    return count
 
 
 class _Recurrences:

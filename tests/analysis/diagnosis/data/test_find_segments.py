@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.data import find_segments as find_segments_module
 from analysis.diagnosis.data.find_segments import find_exact_period, find_segments
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 from equalizer.signals.recording import Recording, Segment
@@ -109,6 +110,23 @@ def test_levels_one_after_another_become_segments():
         (ends[4], ends[5], "noise", 0), (ends[5], ends[6], "multisine", 500),
     ]  # fmt: skip
     assert said.startswith("In 4 of 5 parts the excitation repeats exactly, every 500 and 900 samples")
+
+
+def test_of_many_places_that_recur_few_samples_are_compared(monkeypatch):
+    """Equal pulses at random times: each recurs at hundreds of places, and nowhere for three periods."""
+    command, starts = np.zeros(200_000), np.random.default_rng(3).integers(0, 199_000, 300)
+    for start in starts:
+        command[start : start + 300] = np.hanning(300)
+    compared = []
+    count_equal = find_segments_module._count_equal
+
+    def count(later, earlier, tolerance):
+        compared.append(found := count_equal(later, earlier, tolerance))
+        return found
+
+    monkeypatch.setattr(find_segments_module, "_count_equal", count)
+    assert find_segments(make_recording(command))[0].segments == ()
+    assert len(compared) > 100 and sum(compared) < 20 * len(command)
 
 
 def test_two_channels_repeat_only_together():
