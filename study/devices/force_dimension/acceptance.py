@@ -13,7 +13,6 @@ from study.devices.device import DeviceInfo
 from study.devices.force_dimension.lab import locate_lab_file
 from study.errors import DeviceError
 from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
-from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-acceptance", 1
 """Values by which the file and its version are recognised."""
@@ -72,13 +71,13 @@ def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
     device, serial number, firmware or SDK, or where `today` is before the acceptance or after its validity."""
     path = locate_acceptance_file()
     try:
-        document = load_json(read_regular(path, MAX_DOCUMENT_BYTES))
+        document = json.loads(read_regular(path, MAX_DOCUMENT_BYTES))
         accepted_on = date.fromisoformat(document["accepted_on"])
         accepted_device = (document["format"], document["version"], document["device"], document["details"])
         baseline = (str(document.get("baseline", "")), str(document.get("baseline_sha256", "")))
     except FileNotFoundError:
         raise _make_lock_error(info, f"There is no acceptance of it ({path})") from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise _make_lock_error(info, f"{path} is no acceptance ({type(error).__name__})") from error
     if accepted_device != (FORMAT, VERSION, info.name, info.details):
         raise _make_lock_error(

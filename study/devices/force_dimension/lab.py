@@ -22,9 +22,8 @@ from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.sources import open_source
 from study.devices.onset_line import PulseSettings
-from study.errors import DeviceError, StudyError
+from study.errors import DeviceError
 from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
-from study.store.disk.atomic_write import write_atomically
 
 Triple = tuple[float, float, float]
 """Three numbers, for three channels or three axes."""
@@ -138,17 +137,30 @@ def write_sensor_table(sensor_table: str) -> Path:
         _parse_settings(text)
         path.parent.mkdir(parents=True, exist_ok=True)
         if previous_content:
-            write_atomically(path.with_name(f"{path.name}.before"), previous_content, overwrite=True)
-        write_atomically(path, text.encode(), overwrite=True)
-    except (StudyError, OSError, ValueError) as error:
+            _replace_file(path.with_name(f"{path.name}.before"), previous_content)
+        _replace_file(path, text.encode())
+    except (DeviceError, OSError, ValueError) as error:
         cause = (
             f"{error.title}. {error.happened}"
-            if isinstance(error, StudyError)
+            if isinstance(error, DeviceError)
             else f"{path} could not be written: {error}."
         )
         remedy = f"Put this table into that file by hand (docs/hardware.md):\n{sensor_table}"
         raise DeviceError("The calibration was not kept", cause, remedy) from error
     return path
+
+
+def _replace_file(path: Path, content: bytes) -> None:
+    """Write a file anew, complete and synced before it replaces an older one, which else stays. Raises OSError."""
+    new_path = path.with_name(f"{path.name}.new")
+    try:
+        with new_path.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        new_path.replace(path)
+    finally:
+        new_path.unlink(missing_ok=True)
 
 
 def _replace_sensor_table(text: str, sensor_table: str) -> str:
