@@ -154,9 +154,8 @@ def _replace_file(path: Path, content: bytes) -> None:
     """Write a file anew, complete and synced before it replaces an older one, which else stays. Raises OSError."""
     new_path = path.with_name(f"{path.name}.new")
     try:
-        with new_path.open("wb") as file:
-            file.write(content)
-            file.flush()
+        new_path.write_bytes(content)
+        with new_path.open("rb+") as file:
             os.fsync(file.fileno())
         new_path.replace(path)
     finally:
