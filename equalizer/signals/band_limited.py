@@ -62,6 +62,19 @@ def compute_end_to_end_line(samples: FloatArray) -> FloatArray:
     return np.asarray((1 - relative_time) * samples[0] + relative_time * samples[-1])
 
 
+def filter_spectrum(
+    samples: FloatArray, compute_gain: Callable[[int], FloatArray], subtract_line: bool = True
+) -> FloatArray:
+    """Filter samples (n, k) in the frequency domain. compute_gain: function of the number of samples of a spectrum that
+    returns the frequency response at its lines, (lines,). Samples are continued beyond both ends by an odd extension.
+    subtract_line: whether the line between the end points is subtracted before and added after filtering."""
+    end_line = compute_end_to_end_line(samples) if subtract_line else np.zeros_like(samples)
+    extended = extend_as_odd(samples - end_line)
+    spectrum = rfft(extended, axis=0)
+    filtered = irfft(compute_gain(len(extended))[:, None] * spectrum, len(extended), axis=0)
+    return np.asarray(filtered[: len(samples)] + end_line)
+
+
 def filter_low_pass(samples: FloatArray, sample_rate_hz: float, band_hz: float, delay_s: float = 0.0) -> FloatArray:
     """Filter samples (n, k) by the low pass, with gain 1/2 at band_hz, and delay them by delay_s seconds. Missing
     samples (NaN) are not allowed and are not detected."""

@@ -10,22 +10,21 @@ has the least noise at each frequency (weights by the inverse variance; a comple
 w^4 = N_a / N_p). The position is the reference: gain and offset of the accelerometer are fitted to it. So is the jump
 of the acceleration at a change of a held command, which a reading just before that change does not contain, while the
 derivative of the position contains half of it. Both are fused only where they agree: what the fit leaves, whitened by
-the noise of both, must be mostly that noise. Begin at
-`fuse_with_accelerations`, which is called by `motion`.
+the noise of both, must be mostly that noise. Begin at `fuse_with_accelerations`, which is called by `motion`.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, rfft, rfftfreq
+from scipy.fft import rfftfreq
 
 from analysis.diagnosis.balance.band import estimate_white_noise_density
 from analysis.diagnosis.data.measured_motion import fill_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.limits import LARGEST_SENSOR_DISAGREEMENT
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_pass_gain, extend_as_odd
+from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_pass_gain, filter_spectrum
 from equalizer.signals.signal import FloatArray
 
 EDGE_PERIODS = 3.0
@@ -58,6 +57,8 @@ def fuse_with_accelerations(
     `fuse_accelerations`."""
     responses = [record.recording.response for record in records]
     columns = [k for k, quantity in enumerate(responses[0].quantities) if DERIVATIVE_OF_QUANTITY.get(quantity) == 2]
+    if not columns:
+        return list(positions)
     accelerations = [fill_gaps(response.samples[:, columns]) for response in responses]
     commands = [fill_gaps(record.command) for record in records]
     return fuse_accelerations(positions, accelerations, commands, responses[0].sample_rate_hz, band_hz)
@@ -77,15 +78,16 @@ def fuse_accelerations(
     constants = [
         np.column_stack([np.diff(samples, axis=0, prepend=samples[:1]), np.ones(len(samples))]) for samples in commands
     ]
+    measured = [[samples[:, [channel]] for samples in accelerations] for channel in range(accelerations[0].shape[1])]
+    acceleration_noises = [_estimate_noise(samples, rate_hz) for samples in measured]
     for column in range(positions[0].shape[1]):
         columns = [samples[:, [column]] for samples in positions]
-        least_disagreement = LARGEST_SENSOR_DISAGREEMENT
-        for channel in range(accelerations[0].shape[1]):
-            measured = [samples[:, [channel]] for samples in accelerations]
-            noise = SensorNoise(_estimate_noise(columns, rate_hz), _estimate_noise(measured, rate_hz))
-            if not min(noise.position, noise.acceleration) > 0:
+        position_noise, least_disagreement = _estimate_noise(columns, rate_hz), LARGEST_SENSOR_DISAGREEMENT
+        for acceleration, acceleration_noise in zip(measured, acceleration_noises, strict=True):
+            if not min(position_noise, acceleration_noise) > 0:
                 continue
-            terms = [np.hstack(pair) for pair in zip(measured, constants, strict=True)]
+            noise = SensorNoise(position_noise, acceleration_noise)
+            terms = [np.hstack(pair) for pair in zip(acceleration, constants, strict=True)]
             coefficients, disagreement = _fit_acceleration(columns, terms, noise, (rate_hz, band_hz))
             if disagreement <= least_disagreement:
                 least_disagreement = disagreement
@@ -140,6 +142,6 @@ def _combine(position: FloatArray, acceleration: FloatArray, noise: SensorNoise,
 def _filter(samples: FloatArray, rate_hz: float, compute_gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Filter samples (n, k) by a gain over the angular frequency (rad/s). Both sensors are continued beyond the ends as
     odd functions, so that there, too, the one remains the second derivative of the other."""
-    extended = extend_as_odd(samples)
-    gain = compute_gain(2 * np.pi * rfftfreq(len(extended), 1 / rate_hz))
-    return np.asarray(irfft(gain[:, None] * rfft(extended, axis=0), len(extended), axis=0)[: len(samples)])
+    return filter_spectrum(
+        samples, lambda length: compute_gain(2 * np.pi * rfftfreq(length, 1 / rate_hz)), subtract_line=False
+    )

@@ -13,7 +13,7 @@ from scipy.fft import rfftfreq
 from analysis.diagnosis.balance.blocks import build_blocks
 from analysis.diagnosis.balance.change_laws import keep_laws
 from analysis.diagnosis.balance.laws.law import BaseTerms
-from analysis.diagnosis.balance.motion import Motion, filter_spectrum
+from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, build_regression
 from analysis.diagnosis.balance.structures import (
     Structure,
@@ -26,6 +26,7 @@ from analysis.diagnosis.balance.structures import (
 )
 from analysis.diagnosis.limits import LINEAR_LAW_GAIN, LINEAR_PART_ROUNDS, MOST_LINEAR_LAWS
 from analysis.diagnosis.types import TimeBudget
+from equalizer.signals.band_limited import filter_spectrum
 from equalizer.signals.signal import FloatArray
 
 TRIAL_DELAY_PERIODS = 2.0 ** np.arange(-5, 2)

@@ -7,12 +7,12 @@ by more (errors in variables; Soderstrom, Automatica 43:939, 2007). Measured acc
 end of the band only, below which noise would dominate the position (`band.py`). Begin at `compute_motions`.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.fft import irfft, rfft, rfftfreq
+from scipy.fft import rfft, rfftfreq
 
 from analysis.diagnosis.balance.band import LEAST_BAND_BEGIN_CYCLES, compute_band_begin_hz, compute_band_end_hz
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
@@ -21,7 +21,7 @@ from analysis.diagnosis.limits import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, M
 from analysis.diagnosis.types import Mask
 from equalizer.effects.discovered_law import collect_channels, name_conditions
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_pass_gain, extend_as_odd
+from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_pass_gain, filter_spectrum
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -269,19 +269,6 @@ def _differentiate_in_band(
 def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: int) -> FloatArray:
     """Compute (n, k): time derivative of order `order`, within 0 to `band_hz`, in the frequency domain."""
     return _differentiate_in_band(samples, rate_hz, (band_hz, 0.0), order, 0.0)
-
-
-def filter_spectrum(
-    samples: FloatArray, compute_gain: Callable[[int], FloatArray], subtract_line: bool = True
-) -> FloatArray:
-    """Filter samples (n, k) in the frequency domain. compute_gain: function of the number of samples of a spectrum that
-    returns the frequency response at its lines, (lines,). Samples are continued beyond both ends by an odd extension.
-    subtract_line: whether the line between the end points is subtracted before and added after filtering."""
-    end_line = compute_end_to_end_line(samples) if subtract_line else np.zeros_like(samples)
-    extended = extend_as_odd(samples - end_line)
-    spectrum = rfft(extended, axis=0)
-    filtered = irfft(compute_gain(len(extended))[:, None] * spectrum, len(extended), axis=0)
-    return np.asarray(filtered[: len(samples)] + end_line)
 
 
 def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:

@@ -10,7 +10,7 @@ from datetime import date, timedelta
 from pathlib import Path
 
 from study.devices.device import DeviceInfo
-from study.devices.force_dimension.lab import locate_lab_file
+from study.devices.force_dimension.lab import locate_lab_file, replace_file
 from study.errors import DeviceError
 from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
 
@@ -59,9 +59,8 @@ def write_acceptance(acceptance: Acceptance) -> Path:
     OSError where the file cannot be written."""
     path = locate_acceptance_file()
     path.parent.mkdir(parents=True, exist_ok=True)
-    new_path = path.with_suffix(".new")
-    new_path.write_text(json.dumps({"format": FORMAT, "version": VERSION, **asdict(acceptance)}, indent=2) + "\n")
-    new_path.replace(path)
+    document = json.dumps({"format": FORMAT, "version": VERSION, **asdict(acceptance)}, indent=2) + "\n"
+    replace_file(path, document.encode())
     return path
 
 

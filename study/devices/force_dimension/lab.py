@@ -137,8 +137,8 @@ def write_sensor_table(sensor_table: str) -> Path:
         _parse_settings(text)
         path.parent.mkdir(parents=True, exist_ok=True)
         if previous_content:
-            _replace_file(path.with_name(f"{path.name}.before"), previous_content)
-        _replace_file(path, text.encode())
+            replace_file(path.with_name(f"{path.name}.before"), previous_content)
+        replace_file(path, text.encode())
     except (DeviceError, OSError, ValueError) as error:
         cause = (
             f"{error.title}. {error.happened}"
@@ -150,7 +150,7 @@ def write_sensor_table(sensor_table: str) -> Path:
     return path
 
 
-def _replace_file(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes) -> None:
     """Write a file anew, complete and synced before it replaces an older one, which else stays. Raises OSError."""
     new_path = path.with_name(f"{path.name}.new")
     try:
